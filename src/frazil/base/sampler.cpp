@@ -1,0 +1,56 @@
+#include "frazil/base/sampler.h"
+
+#include "frazil/base/random.h"
+
+namespace frazil {
+namespace {
+
+std::uint32_t reverse_bits(std::uint32_t x) {
+    x = ((x >> 1) & 0x55555555U) | ((x & 0x55555555U) << 1);
+    x = ((x >> 2) & 0x33333333U) | ((x & 0x33333333U) << 2);
+    x = ((x >> 4) & 0x0f0f0f0fU) | ((x & 0x0f0f0f0fU) << 4);
+    return __builtin_bswap32(x);
+}
+
+// Nested uniform scramble of a bit-reversed integer: a Laine-Karras permutation, constants after [Burley2020] and
+// N. Vegdahl's improved set.
+std::uint32_t laine_karras(std::uint32_t x, std::uint32_t seed) {
+    x ^= x * 0x3d20adeaU;
+    x += seed;
+    x *= (seed >> 16) | 1U;
+    x ^= x * 0x05526c56U;
+    x ^= x * 0x53a22864U;
+    return x;
+}
+
+std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
+    return reverse_bits(laine_karras(reverse_bits(x), seed));
+}
+
+// The second Sobol dimension, from its Pascal-triangle generator matrix; the first is the bit reversal.
+std::uint32_t sobol_second(std::uint32_t index) {
+    std::uint32_t result = 0;
+    for (std::uint32_t column = 1U << 31; index != 0; index >>= 1, column ^= column >> 1) {
+        if (index & 1U) result ^= column;
+    }
+    return result;
+}
+
+}  // namespace
+
+Sampler::Sampler(std::uint32_t seed, std::uint32_t sequence, std::uint32_t sample)
+    : sequence_seed_(hash(seed, sequence)), sample_(sample) {}
+
+float Sampler::next_1d() {
+    return next_2d().x;
+}
+
+V2f Sampler::next_2d() {
+    const std::uint32_t pair_seed = hash(sequence_seed_, dimension_++);
+    const std::uint32_t index = owen_scramble(sample_, pair_seed);
+    const std::uint32_t x = owen_scramble(reverse_bits(index), hash(pair_seed, 1U));
+    const std::uint32_t y = owen_scramble(sobol_second(index), hash(pair_seed, 2U));
+    return {to_unit_float(x), to_unit_float(y)};
+}
+
+}  // namespace frazil

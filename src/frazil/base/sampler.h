@@ -1,0 +1,34 @@
+// Owen-scrambled Sobol points, as a pure function of (seed, sequence, sample, dimension).
+// Model: [Burley2020] hash-based nested uniform scrambling of the first two Sobol dimensions; further pairs of
+//   dimensions are the same two, shuffled against each other by Owen-scrambling the sample index.
+// Units: values in [0, 1).
+// Valid: up to 2^32 samples; the first 2^m samples of every pair are a (0,m,2)-net in base 2.
+// Not: one sequence over all pixels; each pixel (or point) is a sequence of its own.
+#pragma once
+
+#include <cstdint>
+
+#include "frazil/base/vec.h"
+
+namespace frazil {
+
+// A stream of quasi-random numbers for one sample: next_1d/next_2d walk the dimensions in order.
+class Sampler {
+  public:
+    // `sequence` tells pixels (or points) apart; `sample` is the index in the sequence.
+    Sampler(std::uint32_t seed, std::uint32_t sequence, std::uint32_t sample);
+
+    float next_1d();
+    // Both numbers come from one pair of dimensions, so that they are stratified together.
+    V2f next_2d();
+
+    // Go to a given dimension, so that a later decision does not depend on how many numbers an earlier one took.
+    void set_dimension(std::uint32_t dimension) { dimension_ = dimension; }
+
+  private:
+    std::uint32_t sequence_seed_;
+    std::uint32_t sample_;
+    std::uint32_t dimension_ = 0;
+};
+
+}  // namespace frazil

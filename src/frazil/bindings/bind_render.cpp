@@ -1,0 +1,7 @@
+#include "frazil/bindings/bindings.h"
+
+namespace frazil {
+
+void bind_render(nb::module_&) {}
+
+}  // namespace frazil

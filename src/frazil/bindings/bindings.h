@@ -1,0 +1,43 @@
+// The Python face of the core: one bind_*.cpp per stage, and the conversions that they share.
+// Model: nanobind; arrays come in by reference and go out as numpy views that keep their owner alive. The GIL is
+// released
+//   around every call that computes.
+// Not: logic of any kind.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "frazil/base/error.h"
+#include "frazil/base/vec.h"
+
+namespace frazil {
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+using FloatArray = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
+using IntArray = nb::ndarray<const std::int32_t, nb::c_contig, nb::device::cpu>;
+
+// Copy an (N, 3)-like array of floats into vectors; ValueError names `what` where the shape is wrong.
+std::vector<V3f> to_vectors3(const FloatArray& array, const char* what);
+std::vector<V2f> to_vectors2(const FloatArray& array, const char* what);
+std::vector<V3i> to_indices3(const IntArray& array, const char* what);
+
+// A numpy view of memory that belongs to `owner`: no copy.
+template <class T>
+nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape, nb::handle owner) {
+    return nb::ndarray<nb::numpy, T>(data, shape, owner);
+}
+
+void bind_geometry(nb::module_& module);
+void bind_points(nb::module_& module);
+void bind_translucency(nb::module_& module);
+void bind_lighting(nb::module_& module);
+void bind_scene(nb::module_& module);
+void bind_render(nb::module_& module);
+
+}  // namespace frazil

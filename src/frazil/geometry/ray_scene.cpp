@@ -1,0 +1,194 @@
+#include "frazil/geometry/ray_scene.h"
+
+#if FRAZIL_EMBREE_MAJOR >= 4
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <bit>
+#include <cstring>
+
+#include "frazil/base/error.h"
+
+namespace frazil {
+namespace {
+
+// The device is shared: Embree keeps its own threads in TBB, so a second one would gain nothing.
+RTCDevice device() {
+    static const RTCDevice shared = rtcNewDevice(nullptr);
+    if (!shared) throw std::runtime_error("Embree: no device could be made on this processor.");
+    return shared;
+}
+
+void throw_if_embree_failed(const char* step) {
+    const RTCError code = rtcGetDeviceError(device());
+    if (code == RTC_ERROR_NONE) return;
+    if (code == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    throw std::runtime_error(str("Embree: ", step, " failed with error ", int(code), "."));
+}
+
+// A triangle geometry with its own copy of the vertices, moved by `local_to_world`.
+RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
+    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 sizeof(V3f), mesh.positions.size()));
+    auto* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(V3i),
+                                            mesh.triangles.size());
+    throw_if_embree_failed("allocating a mesh");
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        const V3f p = mesh.positions[i] * local_to_world;
+        vertices[3 * i] = p.x, vertices[3 * i + 1] = p.y, vertices[3 * i + 2] = p.z;
+    }
+    std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(V3i));
+    rtcCommitGeometry(geometry);
+    return geometry;
+}
+
+RTCScene make_scene() {
+    RTCScene scene = rtcNewScene(device());
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    return scene;
+}
+
+void set_ray(const Ray& ray, RTCRay& out) {
+    out.org_x = ray.origin.x, out.org_y = ray.origin.y, out.org_z = ray.origin.z;
+    out.dir_x = ray.direction.x, out.dir_y = ray.direction.y, out.dir_z = ray.direction.z;
+    out.tnear = ray.t_min;
+    out.tfar = ray.t_max;
+    out.time = 0.0f;
+    out.mask = ~0U;
+    out.id = 0;
+    out.flags = 0;
+}
+
+}  // namespace
+
+struct RayScene::Impl {
+    RTCScene top = make_scene();
+    std::vector<RTCScene> prototypes;
+    std::vector<std::uint32_t> placement_of_geometry;
+    std::vector<M44f> world_to_local;       // by placement; for the normals of instances
+    std::vector<std::uint8_t> is_mirrored;  // by placement; baked vertices then wind the other way
+
+    Impl() = default;
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() {
+        rtcReleaseScene(top);
+        for (RTCScene scene : prototypes) {
+            if (scene) rtcReleaseScene(scene);
+        }
+    }
+
+    void attach(RTCGeometry geometry, std::uint32_t placement) {
+        const unsigned id = rtcAttachGeometry(top, geometry);
+        rtcReleaseGeometry(geometry);
+        if (placement_of_geometry.size() <= id) placement_of_geometry.resize(id + 1);
+        placement_of_geometry[id] = placement;
+    }
+};
+
+RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>& placements)
+    : impl_(std::make_unique<Impl>()) {
+    std::vector<std::uint32_t> uses(meshes.size(), 0);
+    for (const Placement& placement : placements) ++uses[placement.mesh];
+
+    // One committed scene per mesh that is placed more than once.
+    impl_->prototypes.resize(meshes.size(), nullptr);
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        if (uses[i] < 2 || meshes[i].triangles.empty()) continue;
+        impl_->prototypes[i] = make_scene();
+        RTCGeometry geometry = make_geometry(meshes[i], M44f());
+        rtcAttachGeometry(impl_->prototypes[i], geometry);
+        rtcReleaseGeometry(geometry);
+        rtcCommitScene(impl_->prototypes[i]);
+    }
+
+    impl_->world_to_local.reserve(placements.size());
+    for (std::uint32_t i = 0; i < placements.size(); ++i) {
+        const Placement& placement = placements[i];
+        impl_->world_to_local.push_back(placement.local_to_world.inverse());
+        impl_->is_mirrored.push_back(placement.local_to_world.determinant() < 0.0f);
+        const Mesh& mesh = meshes[placement.mesh];
+        if (mesh.triangles.empty()) continue;
+        RTCScene prototype = impl_->prototypes[placement.mesh];
+        if (!prototype) {
+            impl_->attach(make_geometry(mesh, placement.local_to_world), i);
+            continue;
+        }
+        RTCGeometry instance = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(instance, prototype);
+        // Row vectors: the matrix in memory is column-major for Embree.
+        rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &placement.local_to_world[0][0]);
+        rtcCommitGeometry(instance);
+        impl_->attach(instance, i);
+    }
+    rtcCommitScene(impl_->top);
+    throw_if_embree_failed("building the ray scene");
+}
+
+RayScene::~RayScene() = default;
+RayScene::RayScene(RayScene&&) noexcept = default;
+RayScene& RayScene::operator=(RayScene&&) noexcept = default;
+
+bool RayScene::intersect(const Ray& ray, Hit& hit) const {
+    RTCRayHit query;
+    set_ray(ray, query.ray);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if FRAZIL_EMBREE_MAJOR >= 4
+    rtcIntersect1(impl_->top, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(impl_->top, &context, &query);
+#endif
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+
+    const bool is_instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+    hit.t = query.ray.tfar;
+    hit.placement = impl_->placement_of_geometry[is_instance ? query.hit.instID[0] : query.hit.geomID];
+    hit.triangle = query.hit.primID;
+    hit.uv = {query.hit.u, query.hit.v};
+    const V3f normal(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
+    if (is_instance) {
+        hit.geometric_normal = transform_normal(normal, impl_->world_to_local[hit.placement]);
+    } else {
+        hit.geometric_normal = normal.normalized() * (impl_->is_mirrored[hit.placement] ? -1.0f : 1.0f);
+    }
+    return true;
+}
+
+bool RayScene::is_occluded(const Ray& ray) const {
+    RTCRay query;
+    set_ray(ray, query);
+#if FRAZIL_EMBREE_MAJOR >= 4
+    rtcOccluded1(impl_->top, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(impl_->top, &context, &query);
+#endif
+    return query.tfar < 0.0f;
+}
+
+V3f offset_origin(const V3f& position, const V3f& normal) {
+    // Integer steps in units of the last place far from the origin, a small constant near it.
+    constexpr float kNearOrigin = 1.0f / 32.0f;
+    constexpr float kFloatScale = 1.0f / 65536.0f;
+    constexpr float kIntScale = 256.0f;
+    V3f result;
+    for (int axis = 0; axis < 3; ++axis) {
+        const float p = position[axis];
+        if (std::abs(p) < kNearOrigin) {
+            result[axis] = p + kFloatScale * normal[axis];
+            continue;
+        }
+        const int step = static_cast<int>(kIntScale * normal[axis]);
+        result[axis] = std::bit_cast<float>(std::bit_cast<std::int32_t>(p) + (p < 0.0f ? -step : step));
+    }
+    return result;
+}
+
+}  // namespace frazil

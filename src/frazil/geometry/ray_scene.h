@@ -1,0 +1,62 @@
+// Rays against the whole scene, by Embree 3.13 or 4.
+// Model: a mesh that is placed once is traced in world space; one that is placed often is an Embree instance. Nested
+//   instances arrive flattened: one placement per leaf.
+// Units: metres, world space. Directions need not be unit length; t counts in their length.
+// Valid: thread-safe after construction. Robust (watertight) traversal.
+// Not: curves, volumes, motion blur.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "frazil/base/vec.h"
+#include "frazil/geometry/mesh.h"
+
+namespace frazil {
+
+struct Ray {
+    V3f origin;
+    V3f direction;
+    float t_min = 0.0f;
+    float t_max = std::numeric_limits<float>::infinity();
+};
+
+struct Hit {
+    float t = 0.0f;
+    std::uint32_t placement = 0;  // index into the placements that the RayScene was made of
+    std::uint32_t triangle = 0;
+    V2f uv;                // barycentrics of the triangle's second and third corner
+    V3f geometric_normal;  // unit length, world space, on the side that the winding tells
+};
+
+// One mesh somewhere in the world; `mesh` is an index.
+struct Placement {
+    std::uint32_t mesh = 0;
+    M44f local_to_world;
+};
+
+class RayScene {
+  public:
+    // The meshes may go after construction. An empty scene is allowed: every ray misses.
+    RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>& placements);
+    ~RayScene();
+    RayScene(RayScene&&) noexcept;
+    RayScene& operator=(RayScene&&) noexcept;
+
+    // The nearest hit in (t_min, t_max); false where there is none.
+    bool intersect(const Ray& ray, Hit& hit) const;
+    // Whether anything lies in (t_min, t_max).
+    bool is_occluded(const Ray& ray) const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+// A ray origin just off the surface at `position`, on the side that `normal` points to: no hit with the surface itself,
+// whatever the scale [Wachter2019].
+V3f offset_origin(const V3f& position, const V3f& normal);
+
+}  // namespace frazil

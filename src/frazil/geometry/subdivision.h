@@ -1,0 +1,46 @@
+// Catmull-Clark surfaces as triangle meshes on the limit surface, by Embree's evaluation.
+// Model: every face is cut into level x level quads (n-gons through their n sub-quads) whose corners lie on the limit
+//   surface, with limit normals. Vertices on shared edges are shared, so that a closed cage gives a watertight mesh.
+// Units: metres.
+// Valid: n-gons, boundaries, creases, corners, holes (faces left out of the result, but shaping their neighbours).
+// Not: Loop and bilinear schemes; displacement.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "frazil/geometry/mesh.h"
+
+namespace frazil {
+
+// A polygon mesh as USD gives it. Right-handed winding.
+struct ControlMesh {
+    std::vector<V3f> positions;
+    std::vector<std::int32_t> face_vertex_counts;
+    std::vector<std::int32_t> face_vertex_indices;
+    std::vector<std::int32_t> hole_faces;
+    // Creases as chains of vertex indices, `crease_lengths` each, with one sharpness per chain.
+    std::vector<std::int32_t> crease_indices;
+    std::vector<std::int32_t> crease_lengths;
+    std::vector<float> crease_sharpnesses;
+    std::vector<std::int32_t> corner_indices;
+    std::vector<float> corner_sharpnesses;
+    // Primvars of the cage: uniform, vertex (varying too) or corner (face-varying).
+    Primvar<V2f> uvs;
+    Primvar<Rgb> colors;
+    bool is_boundary_smooth = false;  // interpolateBoundary: false = edgeAndCorner, true = edgeOnly
+};
+
+struct RefinedMesh {
+    Mesh mesh;
+    std::vector<std::int32_t> faces;  // the cage face of each triangle
+};
+
+// Refine the cage; `level` >= 1 is the number of quads along each edge of a quad face. Errors name `path`.
+RefinedMesh subdivide(const ControlMesh& cage, int level, const std::string& path);
+
+// The same cage as flat polygons: n-gons cut by ear clipping in their plane, holes left out.
+RefinedMesh triangulate(const ControlMesh& cage, const std::string& path);
+
+}  // namespace frazil

@@ -1,0 +1,42 @@
+// Irradiance at points: the light that enters a translucent body, baked once per shot.
+// Model: E = ∫ L(w) T(cos) cos dw over the outer hemisphere, per light group, with ray-traced shadows and the
+//   boundary's transmittance T; every light is served by its own stratified samples, quasi-Monte Carlo per point.
+// Units: W/m² (the lights' unit).
+// Valid: the same bits for any number of threads; seeded by (seed, point, sample).
+// Not: bounces between surfaces.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "frazil/base/progress.h"
+#include "frazil/geometry/ray_scene.h"
+#include "frazil/lighting/light_sampling.h"
+#include "frazil/points/point_set.h"
+
+namespace frazil {
+
+struct IrradianceOptions {
+    int samples = 64;  // per point and light
+    std::uint32_t seed = 0;
+};
+
+struct Irradiance {
+    std::size_t groups = 1;
+    std::vector<Rgb> values;  // (N, groups)
+    std::uint64_t rays = 0;
+    std::uint64_t dropped_samples = 0;  // non-finite
+};
+
+// The light groups of a light list in order of first appearance; an empty name is the default group.
+std::vector<std::string> light_groups(const std::vector<Light>& lights);
+
+// `transmittance(cos)` is the fraction of light that enters at that angle: 1 - Fresnel, or a table for a rough
+// boundary.
+Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
+                           const std::function<float(float)>& transmittance, const IrradianceOptions& options = {},
+                           Progress* progress = nullptr);
+
+}  // namespace frazil

@@ -1,0 +1,26 @@
+// Points on a mesh that stand for its surface: where light enters, and what the translucency sum runs over.
+// Model: every point has the area of the surface nearest to it; the areas sum to the mesh's.
+// Units: metres, m².
+// Valid: made by poisson_points or tessellated_points; arrays of equal length.
+// Not: irradiance, which belongs to a shot, not to the mesh.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "frazil/base/vec.h"
+
+namespace frazil {
+
+struct PointSet {
+    std::vector<V3f> positions;
+    std::vector<V3f> normals;  // geometric, unit length
+    std::vector<float> areas;
+    std::vector<std::int32_t> triangles;
+    std::vector<V2f> barycentrics;  // of the triangle's second and third corner
+    float spacing = 0.0f;
+
+    std::size_t size() const { return positions.size(); }
+};
+
+}  // namespace frazil

@@ -1,0 +1,58 @@
+// The octree of points with their irradiance, and the sum over it: where translucency comes from.
+// Model: [JensenBuhler2002]; clusters carry area- and power-weighted centres, and one traversal gives both
+//   S_g = Σ E_gk Rd(r_k) ramp(r_k) A_k per light group and W = Σ Rd(r_k) A_k over the very same cut.
+// Units: metres; irradiance and exitance in W/m² (or whatever unit the lights have).
+// Valid: thread-safe after construction; results do not depend on the number of threads, to the bit.
+// Not: the lights. Points with non-finite irradiance are left out and counted.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "frazil/base/vec.h"
+#include "frazil/points/point_set.h"
+#include "frazil/translucency/profile.h"
+#include "frazil/translucency/ramp.h"
+
+namespace frazil {
+
+enum class Estimator {
+    noise_free,  // kernel averaged over the footprints of near points, normalised by the coverage's sampling error
+    sum,         // the plain sum of [JensenBuhler2002]
+};
+
+struct GatherOptions {
+    float tolerance = 0.01f;  // relative error of a gather that clustering may make; > 0
+    Estimator estimator = Estimator::noise_free;
+};
+
+struct Gathered {
+    std::size_t groups = 1;
+    std::vector<Rgb> exitance;  // S, (M, groups), without area compensation
+    std::vector<Rgb> coverage;  // W, (M), without ramp
+};
+
+class PointTree {
+  public:
+    // `irradiance` is (N, groups), row by row: irradiance[k * groups + g]. ValueError where sizes disagree.
+    PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
+              const Ramp& ramp = {});
+    ~PointTree();
+    PointTree(PointTree&&) noexcept;
+    PointTree& operator=(PointTree&&) noexcept;
+
+    // Gather at M positions, in any order; nearby ones share a traversal.
+    Gathered gather(const V3f* positions, std::size_t count, const GatherOptions& options = {}) const;
+
+    const Profile& profile() const;
+    std::size_t point_count() const;
+    std::size_t node_count() const;
+    std::size_t dropped_count() const;  // points left out for their non-finite irradiance
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace frazil
