@@ -5,7 +5,6 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/random.h"
 #include "frazil/base/sampler.h"
 
 namespace frazil {
@@ -93,15 +92,15 @@ class Baker {
     }
 
   private:
-    // A (0,m,2)-net of its own for every point and light. A dome's two halves are each the start of a sequence.
+    // A (0,m,2)-net of its own for every point. All lights share it: a light and its negative twin then cancel to the
+    // bit, and a light's share does not depend on the others. A dome's two halves are each the start of a sequence.
     void draw_numbers(std::uint32_t point, int light, Workspace& work) const {
         const bool is_split = lights_.world_light(light).is_dome() && !lights_.world_light(light).is_uniform_dome();
         const std::uint32_t n = std::uint32_t(options_.samples), first = is_split ? n / 2 : n;
-        const std::uint32_t seed = hash(options_.seed, std::uint32_t(light));
         work.u.resize(n);
         work.samples.resize(n);
         for (std::uint32_t i = 0; i < n; ++i) {
-            Sampler sampler(seed, point, i < first ? i : i - first);
+            Sampler sampler(options_.seed, point, i < first ? i : i - first);
             sampler.set_dimension(i < first ? 0 : 1);
             work.u[i] = sampler.next_2d();
         }

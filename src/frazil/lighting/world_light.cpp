@@ -1,5 +1,7 @@
 #include "frazil/lighting/world_light.h"
 
+#include <algorithm>
+
 #include "frazil/lighting/spherical_rectangle.h"
 
 namespace frazil {
@@ -135,6 +137,7 @@ WorldLight::WorldLight(const Light& light) {
 }
 
 void WorldLight::sample(const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const {
+    std::fill(out.begin(), out.end(), LightSample());
     std::visit([&](const auto& shape) { sample_from(shape, position, u, out); }, shape_);
 }
 
@@ -175,7 +178,6 @@ float WorldLight::importance(const V3f& position) const {
 void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> u, std::span<LightSample> out) const {
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        sample.distance = kInfinity;
         if (!dome.image) {
             sample.direction = uniform_sphere(u[i]);
             sample.radiance = radiance_;
@@ -202,7 +204,6 @@ void WorldLight::sample_from(const Distant& distant, const V3f&, std::span<const
                              std::span<LightSample> out) const {
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        sample.distance = kInfinity;
         sample.radiance = radiance_;
         sample.is_delta = distant.cap == 0.0f;
         sample.direction = sample.is_delta ? distant.axis : sample_cone(distant.axis, distant.cap, u[i]);
@@ -233,10 +234,7 @@ void WorldLight::sample_from(const Rect& rect, const V3f& position, std::span<co
                              std::span<LightSample> out) const {
     V3f at;
     rect.world_to_local.multDirMatrix(position - rect.center, at);
-    if (!(at.z > 0.0f)) {
-        for (LightSample& sample : out) sample.pdf = 0.0f;
-        return;
-    }
+    if (!(at.z > 0.0f)) return;
     const SphericalRectangle view = seen_from(at, rect.width, rect.height);
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
@@ -271,10 +269,9 @@ void WorldLight::sample_from(const Disk& disk, const V3f& position, std::span<co
                              std::span<LightSample> out) const {
     const V3f to_center = disk.center - position;
     const float height = -to_center.dot(disk.normal);
+    if (!(height > 0.0f)) return;
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        sample.pdf = 0.0f;
-        if (!(height > 0.0f)) continue;
         const float r = std::sqrt(u[i].x), phi = 2.0f * kPi * u[i].y;
         const V3f to_light = to_center + disk.x * (r * std::cos(phi)) + disk.y * (r * std::sin(phi));
         const float distance = to_light.length();
@@ -313,10 +310,7 @@ void WorldLight::sample_from(const Sphere& sphere, const V3f& position, std::spa
     V3f at;
     sphere.world_to_local.multDirMatrix(position - sphere.center, at);
     const float distance2 = at.length2();
-    if (!(distance2 > 1.0f)) {
-        for (LightSample& sample : out) sample.pdf = 0.0f;
-        return;
-    }
+    if (!(distance2 > 1.0f)) return;
     const float cap = cap_of_unit_sphere(at), center_distance = std::sqrt(distance2);
     const V3f axis = -at / center_distance;
     for (std::size_t i = 0; i < u.size(); ++i) {
@@ -363,12 +357,11 @@ void WorldLight::sample_from(const Cylinder& cylinder, const V3f& position, std:
     V3f at;
     cylinder.world_to_local.multDirMatrix(position - cylinder.center, at);
     const float axis_distance = std::sqrt(at.y * at.y + at.z * at.z);
-    const float arc = axis_distance > 1.0f ? visible_arc(axis_distance) : 0.0f;
+    if (!(axis_distance > 1.0f)) return;
+    const float arc = visible_arc(axis_distance);
     const float middle = std::atan2(at.z, at.y);
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        sample.pdf = 0.0f;
-        if (arc == 0.0f) continue;
         const float phi = middle + (2.0f * u[i].x - 1.0f) * arc, c = std::cos(phi), s = std::sin(phi);
         const V3f point = cylinder.center + cylinder.axis * (u[i].y - 0.5f) + cylinder.y * c + cylinder.z * s;
         const V3f to_light = point - position;

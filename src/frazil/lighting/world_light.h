@@ -39,7 +39,7 @@ class WorldLight {
     // ValueError where check_light refuses the light.
     explicit WorldLight(const Light& light);
 
-    // out[i] from u[i]; the pdf has no pick and `light` is left as it is. Samples towards one point share its set-up.
+    // out[i] from u[i]; the pdf has no pick and `light` stays -1. Samples towards one point share its set-up.
     void sample(const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
 
     // False where the ray misses, or meets the light at or beyond t_max or from its dark side.
