@@ -55,7 +55,8 @@ Footprint footprint(const Texture& texture, const V2f& st) {
         const bool is_black = i < 0 || j < 0;
         result.weight[corner] = is_black ? 0.0f : weight;
         result.offset[corner] =
-            is_black ? 0 : (std::size_t(j) * std::size_t(texture.width) + std::size_t(i)) * std::size_t(texture.channels);
+            is_black ? 0
+                     : (std::size_t(j) * std::size_t(texture.width) + std::size_t(i)) * std::size_t(texture.channels);
     }
     return result;
 }
