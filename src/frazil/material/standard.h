@@ -1,6 +1,7 @@
 // UsdPreviewSurface: what everything but ice is made of.
-// Model: UsdPreviewSurface 2.6: diffuse + GGX specular (metallic or specular workflow) + clearcoat + emission +
-// opacity. Units: roughness is the user's (alpha = roughness²). Valid: the ranges of the specification.
+// Model: UsdPreviewSurface 2.6: diffuse + GGX specular (metallic or specular workflow) + clearcoat + emission + opacity.
+// Units: roughness is the user's (alpha = roughness²).
+// Valid: the ranges of the specification.
 #pragma once
 
 #include "frazil/material/texture.h"
