@@ -1,6 +1,5 @@
 // UsdPreviewSurface: what everything but ice is made of.
-// Model: UsdPreviewSurface 2.6: diffuse + GGX specular (metallic or specular workflow) + clearcoat + emission +
-// opacity.
+// Model: UsdPreviewSurface 2.6: diffuse + GGX specular (metallic or specular workflow) + clearcoat + emission + opacity.
 //   Fresnel by Schlick; multiple scattering compensated and diffuse coupled to it [KullaConty2017]: a white surface
 //   without clearcoat reflects all it receives.
 // Units: roughness is the user's (alpha = roughness²).
