@@ -1,7 +1,8 @@
 // Images on surfaces: bilinear lookup. Files are read in Python; the core sees arrays.
-// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image. A missing alpha
-// reads 1. Units: values after `scale` and `bias`, linear. Valid: 1 to 4 channels; any size; a non-finite st reads as
-// (0,0). Not: UDIM, mip-maps, anisotropic filtering.
+// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image. A missing alpha is 1.
+// Units: values after `scale` and `bias`, linear.
+// Valid: 1 to 4 channels; any size; a non-finite st reads as (0,0).
+// Not: UDIM, mip-maps, anisotropic filtering.
 #pragma once
 
 #include <memory>
