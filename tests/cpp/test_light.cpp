@@ -75,18 +75,8 @@ TEST_CASE("light: the density of sample() is the one it tells, and integrates to
         const bool is_infinite =
             std::holds_alternative<DomeLight>(c.light.shape) || std::holds_alternative<DistantLight>(c.light.shape);
         // Cells over a cone about the light, so that a far one fills them too; the side that shines faces the point.
-        V3f axis(0, 0, 1);
-        double cap = 2.0;
         V3f position = c.position;
-        if (!is_infinite) {
-            const V3f to_light = c.light.light_to_world.translation() - position;
-            if (light.importance(position) == 0.0f) position = c.light.light_to_world.translation() + to_light;
-            axis = (c.light.light_to_world.translation() - position).normalized();
-            const double sine = std::min(1.0, 2.2 / double((c.light.light_to_world.translation() - position).length()));
-            // Off centre, so that a round rim does not run along a ring of cells.
-            axis = (axis + tangent_frame(axis).first * float(0.25 * sine)).normalized();
-            cap = sine == 1.0 ? 2.0 : 1.0 - std::sqrt(1.0 - sine * sine);
-        }
+        if (light.importance(position) == 0.0f) position = c.light.light_to_world.translation() * 2.0f - position;
         const auto sample = [&](const V2f& u, V3f& d) {
             LightSample s;
             light.sample(position, {&u, 1}, {&s, 1});
@@ -97,6 +87,23 @@ TEST_CASE("light: the density of sample() is the one it tells, and integrates to
             LightHit hit;
             return light.intersect(position, d, kInfinity, hit) ? double(hit.pdf) : 0.0;
         };
+        V3f axis(0, 0, 1);
+        double cap = 2.0;
+        if (!is_infinite) {
+            const auto reach = [&] {
+                double result = 0.0;
+                for (std::uint32_t i = 0; i < 4096; ++i) {
+                    Sampler sampler(2, 0, i);
+                    V3f d;
+                    if (sample(sampler.next_2d(), d)) result = std::max(result, 0.5 * double((d - axis).length2()));
+                }
+                return result;
+            };
+            // Off centre, so that a round rim does not run along a ring of cells.
+            axis = (c.light.light_to_world.translation() - position).normalized();
+            axis = (axis + tangent_frame(axis).first * float(0.5 * std::sqrt(reach()))).normalized();
+            cap = std::min(2.0, 1.1 * reach());
+        }
         const auto result = test::chi_square(sample, pdf, axis, cap);
         CAPTURE(c.name);
         CAPTURE(position.x);
