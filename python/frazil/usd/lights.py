@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from .._frazil import DiskLight, DistantLight, DomeLight, Light, RectLight, Scene, SphereLight
+from .._frazil import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, Scene, SphereLight
 from .context import ReadContext, is_singular
 from .textures import decode_srgb, is_srgb, read_image, resolve
 
@@ -97,7 +97,7 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
             angle = 0.53
         return DistantLight(angle)
     sizes = {"RectLight": (("width", 1.0), ("height", 1.0)), "DiskLight": (("radius", 0.5),),
-             "SphereLight": (("radius", 0.5),)}.get(kind)
+             "SphereLight": (("radius", 0.5),), "CylinderLight": (("length", 1.0), ("radius", 0.5))}.get(kind)
     if sizes is None:
         context.warn(prim.GetPath(), f"lights of type {kind or 'none'} are not supported. It is left out.")
         return None
@@ -110,7 +110,7 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
         if _get(context, prim, "texture:file", Sdf.AssetPath()).path:
             context.warn(prim.GetPath(), "textures on rect lights are not supported. It shines evenly.")
         return RectLight(*values)
-    return DiskLight(*values) if kind == "DiskLight" else SphereLight(*values)
+    return {"DiskLight": DiskLight, "SphereLight": SphereLight, "CylinderLight": CylinderLight}[kind](*values)
 
 
 def _read_dome(context: ReadContext, prim: Usd.Prim) -> DomeLight:
@@ -134,9 +134,9 @@ def _read_dome(context: ReadContext, prim: Usd.Prim) -> DomeLight:
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     if is_srgb(color_space, is_8_bit, 3):
         pixels = decode_srgb(pixels)
-    is_good = np.isfinite(pixels) & (pixels >= 0)
+    is_good = np.isfinite(pixels)
     if not is_good.all():
-        context.warn(prim.GetPath(), f"{path} has {int((~is_good).sum())} negative or non-finite values. Taken as 0.")
+        context.warn(prim.GetPath(), f"{path} has {int((~is_good).sum())} NaN or infinite values. They are taken as 0.")
         pixels = np.where(is_good, pixels, 0.0)
     return DomeLight(np.ascontiguousarray(pixels, dtype=np.float32), str(prim.GetPath()))
 

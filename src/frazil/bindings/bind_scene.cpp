@@ -79,11 +79,16 @@ void bind_lights(nb::module_& module) {
     nb::class_<SphereLight>(module, "SphereLight", "A sphere that shines outwards, in the light's units.")
         .def(nb::init<float>(), "radius"_a = 0.5f)
         .def_rw("radius", &SphereLight::radius);
+    nb::class_<CylinderLight>(module, "CylinderLight",
+                              "A tube about x without caps that shines outwards, in the light's units.")
+        .def(nb::init<float, float>(), "length"_a = 1.0f, "radius"_a = 0.5f)
+        .def_rw("length", &CylinderLight::length)
+        .def_rw("radius", &CylinderLight::radius);
 
     nb::class_<Light>(module, "Light",
                       "A light of the scene.\n\n"
                       "Parameters\n----------\n"
-                      "shape : DomeLight, DistantLight, RectLight, DiskLight or SphereLight.\n"
+                      "shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.\n"
                       "radiance : RGB, the product of intensity, exposure, colour and colour temperature.\n"
                       "matrix : (4, 4) float64 light to world, for row vectors; None = identity.\n"
                       "path : name for messages. group : light group, '' = the default one.\n"
@@ -119,7 +124,7 @@ void bind_lights(nb::module_& module) {
         .def_prop_ro("translucency",
                      [](const Light& light) { return light.multipliers[int(LightComponent::translucency)]; })
         .def("__repr__", [](const Light& light) {
-            constexpr const char* kShapes[] = {"dome", "distant", "rect", "disk", "sphere"};
+            constexpr const char* kShapes[] = {"dome", "distant", "rect", "disk", "sphere", "cylinder"};
             return str("Light(", light.path, ", ", kShapes[light.shape.index()], ", radiance=(", light.radiance.x, ", ",
                        light.radiance.y, ", ", light.radiance.z, "))");
         });
