@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdShade
 
-from .. import _frazil
-from .._frazil import IceMaterial, Scene, StandardMaterial
+from .._frazil import IceMaterial, Medium, Scene, StandardMaterial
 from .context import ReadContext
 from .material_inputs import (
     ICE_INPUTS,
@@ -77,7 +76,7 @@ class MaterialReader:
             self._context.warn(prim.GetPath(), f"is bound to <{path}>, which is no material. Its displayColor is shown.")
 
     def _read(self, material: UsdShade.Material):
-        shader, _, _ = material.ComputeSurfaceSource(["frazil", ""])
+        shader, _, _ = material.ComputeSurfaceSource("frazil")  # or the universal one
         if not shader:
             return self._read_nearest(material, None)
         kind = shader.GetShaderId()
@@ -103,9 +102,9 @@ class MaterialReader:
             has_sigma = False
         if has_sigma:
             sigma_a = values["sigma_a"] or (0.0, 0.0, 0.0)
-            medium = _frazil.Medium(values["sigma_s_prime"], sigma_a, values["eta"])
+            medium = Medium(values["sigma_s_prime"], sigma_a, values["eta"])
         else:
-            medium = _frazil.medium_from_albedo(values["albedo"], values["mean_free_path"], values["eta"])
+            medium = Medium.from_albedo(values["albedo"], values["mean_free_path"], values["eta"])
 
         distances, colors = self._check_ramp(path, values["ramp_distances"], values["ramp_colors"])
         model = IceMaterial(

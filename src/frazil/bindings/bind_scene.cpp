@@ -15,11 +15,11 @@ M44f to_matrix(const MatrixArray& array) {
     return matrix;
 }
 
-nb::ndarray<nb::numpy, double> from_matrix(const M44f& matrix) {
+nb::object from_matrix(const M44f& matrix) {
     auto* values = new double[16];
     for (int i = 0; i < 16; ++i) values[i] = matrix[i / 4][i % 4];
     nb::capsule owner(values, [](void* memory) noexcept { delete[] static_cast<double*>(memory); });
-    return nb::ndarray<nb::numpy, double>(values, {4, 4}, owner);
+    return nb::cast(nb::ndarray<nb::numpy, double>(values, {4, 4}, owner));
 }
 
 namespace {

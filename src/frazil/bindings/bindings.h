@@ -36,7 +36,7 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
 // A (4, 4) float64 matrix for row vectors, as USD's GfMatrix4d and Imath have it.
 using MatrixArray = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 M44f to_matrix(const MatrixArray& array);
-nb::ndarray<nb::numpy, double> from_matrix(const M44f& matrix);
+nb::object from_matrix(const M44f& matrix);
 
 void bind_geometry(nb::module_& module);
 void bind_material(nb::module_& module);

@@ -15,6 +15,8 @@ namespace frazil {
 namespace {
 
 constexpr int kMaxFaceSize = 15;        // Embree's
+constexpr float kCreaseMargin = 0.02f;       // of a patch, for normals beside creases
+constexpr float kSameSurface = 0.97f;        // cosine between normals of one vertex that are still one surface
 constexpr float kInfiniteSharpness = 10.0f;  // USD's
 
 // The cage without faces that Embree cannot take: fewer than three corners, or more than 15. `faces` tells where each
@@ -123,8 +125,8 @@ class LimitSurface {
         geometry_ = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_SUBDIVISION);
         set_buffer(RTC_BUFFER_TYPE_FACE, 0, RTC_FORMAT_UINT, cage.face_vertex_counts);
         set_buffer(RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, cage.face_vertex_indices);
-        set_buffer(RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, cage.positions);
-        set_buffer(RTC_BUFFER_TYPE_HOLE, 0, RTC_FORMAT_UINT, cage.hole_faces);
+        set_float_buffer(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, cage.positions);
+        // Holes are not told to Embree, which would make boundaries of their edges; they are just never evaluated.
         set_creases(cage);
         rtcSetGeometrySubdivisionMode(
             geometry_, 0,
@@ -171,6 +173,17 @@ class LimitSurface {
         std::memcpy(memory, values.data(), values.size() * sizeof(T));
     }
 
+    // Embree loads four floats at once, also behind the last value: rows of four, zeros behind.
+    template <class T>
+    void set_float_buffer(RTCBufferType type, RTCFormat format, const std::vector<T>& values) {
+        constexpr std::size_t kStride = 4 * sizeof(float);
+        auto* memory =
+            static_cast<std::byte*>(rtcSetNewGeometryBuffer(geometry_, type, 0, format, kStride, values.size()));
+        throw_if_embree_failed("allocating a subdivision surface");
+        std::memset(memory, 0, values.size() * kStride);
+        for (std::size_t i = 0; i < values.size(); ++i) std::memcpy(memory + i * kStride, &values[i], sizeof(T));
+    }
+
     static float sharpness(float value) {
         return value >= kInfiniteSharpness ? std::numeric_limits<float>::infinity() : value;
     }
@@ -207,12 +220,12 @@ class LimitSurface {
         if (cage.uvs.is_empty()) return;
         rtcSetGeometryVertexAttributeCount(geometry_, 1);
         if (cage.uvs.interpolation == Interpolation::vertex) {
-            set_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, 0, RTC_FORMAT_FLOAT2, cage.uvs.values);
+            set_float_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, RTC_FORMAT_FLOAT2, cage.uvs.values);
         } else if (cage.uvs.interpolation == Interpolation::corner) {
             const Seams seams = find_seams(cage);
             rtcSetGeometryTopologyCount(geometry_, 2);
             set_buffer(RTC_BUFFER_TYPE_INDEX, 1, RTC_FORMAT_UINT, seams.indices);
-            set_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, 0, RTC_FORMAT_FLOAT2, seams.values);
+            set_float_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, RTC_FORMAT_FLOAT2, seams.values);
             rtcSetGeometrySubdivisionMode(geometry_, 1, RTC_SUBDIVISION_MODE_PIN_BOUNDARY);
             rtcSetGeometryVertexAttributeTopology(geometry_, 0, 1);
         }
@@ -273,8 +286,9 @@ struct Patch {
     std::size_t sample(int i, int j) const { return first_sample + std::size_t(j) * side() + i; }
 
     // Embree's face coordinates: sub-quads lie in cells of a 4 x 4 board, shrunk to half so that they do not touch.
-    V2f coordinates(int i, int j) const {
-        const float u = float(i) / float(steps), v = float(j) / float(steps);
+    V2f coordinates(int i, int j, float margin = 0.0f) const {
+        const float u = std::clamp(float(i) / float(steps), margin, 1.0f - margin);
+        const float v = std::clamp(float(j) / float(steps), margin, 1.0f - margin);
         if (sub < 0) return {u, v};
         return {2.0f * float(sub % 4) + 0.5f + u, 2.0f * float(sub / 4) + 0.5f + v};
     }
@@ -396,6 +410,11 @@ class Refinement {
                         const std::size_t at = patch.sample(i, j);
                         const V2f uv = patch.coordinates(i, j);
                         surface.eval(patch.face, uv, positions_[at], normals_[at]);
+                        if (has_creases()) {
+                            // On a sharp edge Embree's tangents are those of a tiny fillet: take them just inside.
+                            V3f ignored;
+                            surface.eval(patch.face, patch.coordinates(i, j, kCreaseMargin), ignored, normals_[at]);
+                        }
                         if (has_smooth_uvs) uvs_[at] = surface.eval_uv(patch.face, uv);
                     }
                 }
@@ -412,27 +431,54 @@ class Refinement {
 
     // One normal per vertex, the mean of what the faces around it say; per corner where creases may break it.
     void set_normals(Mesh& mesh, const std::vector<std::size_t>& corner_samples) {
-        std::vector<V3f> sums(vertex_count_, V3f(0.0f));
-        for (std::size_t at = 0; at < vertices_.size(); ++at) sums[vertices_[at]] += normals_[at];
-        // Where the tangents of every face vanish, fall back to the triangles around.
-        std::vector<V3f> flat(vertex_count_, V3f(0.0f));
-        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-            const V3f cross(triangle_cross(mesh, t));
-            for (int corner = 0; corner < 3; ++corner) flat[mesh.triangles[t][corner]] += cross;
+        // Where tangents vanish (on infinite creases), the triangles of the same patch tell.
+        std::vector<V3f> flat(vertices_.size(), V3f(0.0f));
+        for (std::size_t i = 0; i < corner_samples.size(); ++i) {
+            flat[corner_samples[i]] += V3f(triangle_cross(mesh, i / 3));
         }
-        for (std::size_t v = 0; v < vertex_count_; ++v) {
-            if (sums[v].length() < 1e-3f) sums[v] = flat[v];
-            sums[v].normalize();
+        for (std::size_t at = 0; at < vertices_.size(); ++at) {
+            if (normals_[at] == V3f(0.0f)) normals_[at] = flat[at].normalized();
         }
-        if (cage_.crease_lengths.empty() && cage_.corner_indices.empty()) {
+        // A normal of length 0 (in the middle of a fold) is none: the first triangle's is taken.
+        const auto fill = [&](V3f& normal, std::size_t triangle) {
+            if (normal == V3f(0.0f)) normal = V3f(triangle_cross(mesh, triangle).normalized());
+        };
+        if (!has_creases()) {
+            std::vector<V3f> sums(vertex_count_, V3f(0.0f));
+            for (std::size_t at = 0; at < vertices_.size(); ++at) sums[vertices_[at]] += normals_[at];
+            for (V3f& sum : sums) sum.normalize();
+            for (std::size_t i = 0; i < corner_samples.size(); ++i) fill(sums[vertices_[corner_samples[i]]], i / 3);
             mesh.normals = {std::move(sums), Interpolation::vertex};
             return;
         }
+        const std::vector<V3f> welded = welded_normals();
         mesh.normals.interpolation = Interpolation::corner;
-        for (const std::size_t at : corner_samples) {
-            const bool is_lost = normals_[at] == V3f(0.0f);
-            mesh.normals.values.push_back(is_lost ? sums[vertices_[at]] : normals_[at]);
+        for (std::size_t i = 0; i < corner_samples.size(); ++i) {
+            mesh.normals.values.push_back(welded[corner_samples[i]]);
+            fill(mesh.normals.values.back(), i / 3);
         }
+    }
+
+    bool has_creases() const { return !cage_.crease_lengths.empty() || !cage_.corner_indices.empty(); }
+
+    // The normal of every sample, averaged with those at the same vertex that belong to the same smooth surface.
+    std::vector<V3f> welded_normals() const {
+        std::vector<std::size_t> order(vertices_.size());
+        std::iota(order.begin(), order.end(), std::size_t(0));
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::size_t a, std::size_t b) { return vertices_[a] < vertices_[b]; });
+        std::vector<V3f> result(vertices_.size());
+        for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+            while (end < order.size() && vertices_[order[end]] == vertices_[order[begin]]) ++end;
+            for (std::size_t i = begin; i < end; ++i) {
+                V3f sum(0.0f);
+                for (std::size_t j = begin; j < end; ++j) {
+                    if (normals_[order[i]].dot(normals_[order[j]]) > kSameSurface) sum += normals_[order[j]];
+                }
+                result[order[i]] = sum.normalized();
+            }
+        }
+        return result;
     }
 
     void set_primvars(Mesh& mesh, const std::vector<std::size_t>& corner_samples,
