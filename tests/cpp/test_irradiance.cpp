@@ -315,7 +315,7 @@ TEST_CASE("irradiance: bad options and points are refused") {
     IrradianceOptions options;
     options.samples = 0;
     CHECK_THROWS_WITH_AS(bake_irradiance(PointSet(), empty, none, full, options),
-                         doctest::Contains("samples must be >= 1, got 0"), ValueError);
+                         doctest::Contains("samples must be in [1, 2^20], got 0"), ValueError);
     PointSet points;
     points.positions = {V3f(0.0f)};
     CHECK_THROWS_WITH_AS(bake_irradiance(points, empty, none, full), doctest::Contains("normals must be one per point"),

@@ -161,6 +161,12 @@ Rgb WorldLight::dome_radiance(const V3f& direction) const {
     return radiance_ * dome.image->eval({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)});
 }
 
+float WorldLight::dome_pdf(const V3f& direction) const {
+    const Dome& dome = std::get<Dome>(shape_);
+    if (!dome.image) return 0.25f * kInvPi;
+    return dome.image->pdf({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)});
+}
+
 float WorldLight::importance(const V3f& position) const {
     if (is_dome()) return kPi * brightness_;
     if (const Distant* distant = std::get_if<Distant>(&shape_)) return distant->size * brightness_;
@@ -194,11 +200,8 @@ void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> 
     }
 }
 
-bool WorldLight::hit_by(const Dome& dome, const V3f&, const V3f& direction, LightHit& hit) const {
-    hit.distance = kInfinity;
-    hit.radiance = dome_radiance(direction);
-    hit.pdf = dome.image ? dome.image->pdf({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)})
-                         : 0.25f * kInvPi;
+bool WorldLight::hit_by(const Dome&, const V3f&, const V3f& direction, LightHit& hit) const {
+    hit = {dome_radiance(direction), dome_pdf(direction), kInfinity, hit.light};
     return true;
 }
 
