@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "frazil/base/sampler.h"
+#include "frazil/base/trigonometry.h"
 
 using namespace frazil;
 
@@ -87,4 +88,19 @@ TEST_CASE("sampler: a scrambled net is a (0,m,2)-net for every sequence, a new o
         // In random order the mean step is 0.52 whatever the count; along the curve it shrinks with the spacing.
         if (m >= 6) CHECK(step < 2.5 / std::sqrt(double(count)));
     }
+}
+
+TEST_CASE("trigonometry: the polynomials are within their bounds") {
+    double worst_circle = 0.0, worst_angle = 0.0;
+    for (int i = 0; i <= 100000; ++i) {
+        const float turns = float(i) / 100000.0f;
+        const double angle = 2.0 * 3.14159265358979323846 * double(turns);
+        const V2f p = cos_sin_turns(turns);
+        worst_circle = std::max({worst_circle, std::abs(p.x - std::cos(angle)), std::abs(p.y - std::sin(angle))});
+        const float y = float(std::sin(angle)), x = float(std::cos(angle));
+        worst_angle = std::max(worst_angle, std::abs(double(fast_atan2(y, x)) - std::atan2(double(y), double(x))));
+    }
+    CHECK(worst_circle < 1e-6);
+    CHECK(worst_angle < 3e-7);
+    CHECK(fast_atan2(0.0f, 0.0f) == 0.0f);
 }

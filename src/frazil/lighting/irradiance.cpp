@@ -6,6 +6,7 @@
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/sampler.h"
+#include "frazil/base/trigonometry.h"
 
 namespace frazil {
 namespace {
@@ -100,7 +101,8 @@ class RayMaker {
             world_light.sample(position, work.u, work.samples);
         } else if (world_light.is_uniform_dome()) {
             whole_.draw(seed_, point, work.u);
-            sample_cosine(world_light, normal, work.u, work.samples);
+            sample_cosine(normal, work.u, work.samples);
+            for (LightSample& sample : work.samples) sample.radiance = world_light.dome_radiance(sample.direction);
         } else {
             sample_dome(world_light, point, work);
         }
@@ -117,27 +119,26 @@ class RayMaker {
         const std::span<LightSample> samples(work.samples);
         if (half > 0) first_half_.draw(seed_, point, u.first(half));
         second_half_.draw(seed_ + 0x9e3779b9U, point, u.subspan(half));
-        sample_cosine(dome, normal, u.first(half), samples.first(half));
+        sample_cosine(normal, u.first(half), samples.first(half));
         dome.sample(points_.positions[point], u.subspan(half), samples.subspan(half));
         const float share = float(half) / float(n);
         for (std::size_t i = 0; i < n; ++i) {
             LightSample& sample = samples[i];
+            float image_pdf = sample.pdf;
+            if (i < half) sample.radiance = dome.dome_radiance(sample.direction, image_pdf);
             const float cosine_pdf = std::max(0.0f, sample.direction.dot(normal)) * kInvPi;
-            const float image_pdf = i < half ? dome.dome_pdf(sample.direction) : sample.pdf;
             sample.pdf = share * cosine_pdf + (1.0f - share) * image_pdf;
         }
     }
 
-    static void sample_cosine(const WorldLight& dome, const V3f& normal, std::span<const V2f> u,
-                              std::span<LightSample> out) {
+    static void sample_cosine(const V3f& normal, std::span<const V2f> u, std::span<LightSample> out) {
         const auto [s, t] = tangent_frame(normal);
         for (std::size_t i = 0; i < u.size(); ++i) {
-            const float r = std::sqrt(u[i].x), phi = 2.0f * kPi * u[i].y;
+            const V2f circle = cos_sin_turns(u[i].y) * std::sqrt(u[i].x);
             const float cosine = std::sqrt(std::max(0.0f, 1.0f - u[i].x));
             LightSample& sample = out[i];
             sample = LightSample();
-            sample.direction = s * (r * std::cos(phi)) + t * (r * std::sin(phi)) + normal * cosine;
-            sample.radiance = dome.dome_radiance(sample.direction);
+            sample.direction = s * circle.x + t * circle.y + normal * cosine;
             sample.pdf = cosine * kInvPi;
         }
     }

@@ -52,7 +52,7 @@ class WorldLight {
     bool is_uniform_dome() const;
     // Radiance of a dome in a direction, and the density with which sample() chooses it; only where is_dome().
     Rgb dome_radiance(const V3f& direction) const;
-    float dome_pdf(const V3f& direction) const;
+    Rgb dome_radiance(const V3f& direction, float& pdf) const;
 
   private:
     struct Dome {
