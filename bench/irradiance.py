@@ -1,7 +1,7 @@
 """How fast and how clean the irradiance bake is.
 
-Bare ray tracing is Embree's single-ray occlusion over the very rays that the bake traces, in the same order and process;
-the ratio bake / bare is the figure to trust on a busy machine. Noise is the relative RMS error of irradiance
+Bare ray tracing is Embree's single-ray occlusion over the very rays that the bake traces, in the same order and
+process; the ratio bake / bare is the figure to trust on a busy machine. Noise is the relative RMS error of irradiance
 against 4096 samples per point and light.
 
     python bench/irradiance.py [MESH] [--points N] [--samples N]

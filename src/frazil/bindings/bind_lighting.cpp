@@ -90,8 +90,10 @@ void bind_lighting(nb::module_& module) {
                 const LightSampler sampler(lights);
                 const DielectricAlbedo albedo(eta);
                 const float alpha = alpha_from_roughness(roughness);
+                IrradianceOptions options;
+                options.samples = samples, options.seed = seed;
                 const auto transmittance = [&](float cosine) { return 1.0f - albedo.eval(cosine, alpha); };
-                baked = bake_irradiance(set, scene, sampler, transmittance, {samples, seed});
+                baked = bake_irradiance(set, scene, sampler, transmittance, options);
             }
             const std::size_t groups = baked->groups;
             return to_array<Rgb, float>(std::move(baked->values), {set.size(), groups, 3});
@@ -117,7 +119,8 @@ void bind_lighting(nb::module_& module) {
            bool is_bare) {
             const PointSet set = to_points(points);
             const LightSampler sampler(lights);
-            const IrradianceOptions options{samples, 0};
+            IrradianceOptions options;
+            options.samples = samples;
             const auto clock = [] { return std::chrono::steady_clock::now(); };
             const std::vector<Ray> rays = is_bare ? shadow_rays(set, sampler, options) : std::vector<Ray>();
             nb::gil_scoped_release release;

@@ -175,8 +175,9 @@ V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
     const float top = row_cosine_[std::size_t(cell.row)], bottom = row_cosine_[std::size_t(cell.row) + 1];
     const float cosine = top + down * (bottom - top);
     const float sine = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
-    // From the left edge, at longitude +pi, to the right.
-    const V2f turn = cos_sin_turns(std::min((float(cell.column) + 0.5f + cell.across) / float(width_), 1.0f));
+    // From the left edge, at longitude +pi, to the right, and over the seam.
+    const float turns = (float(cell.column) + 0.5f + cell.across) / float(width_);
+    const V2f turn = cos_sin_turns(turns > 1.0f ? turns - 1.0f : turns);
     const float theta = fast_atan2(sine, cosine);
     cell.down = std::clamp(theta * kInvPi * float(height_) + 0.5f - float(cell.row), 0.0f, 1.0f);
     radiance = radiance_in(cell);

@@ -181,17 +181,18 @@ Rgb trace(const RayScene& scene, Workspace& work) {
     return Rgb(sum / double(work.count));
 }
 
-// A light that reaches translucency, and where its irradiance goes.
+// A light that reaches the component, and where its irradiance goes.
 struct Task {
     int light;
     std::size_t group;
     float multiplier;
 };
 
-std::vector<Task> translucency_tasks(const std::vector<Light>& lights, const std::vector<std::string>& groups) {
+std::vector<Task> light_tasks(const std::vector<Light>& lights, const std::vector<std::string>& groups,
+                              LightComponent component) {
     std::vector<Task> tasks;
     for (std::size_t i = 0; i < lights.size(); ++i) {
-        const float multiplier = lights[i].multipliers[int(LightComponent::translucency)];
+        const float multiplier = lights[i].multipliers[int(component)];
         if (multiplier == 0.0f || lights[i].radiance == Rgb(0.0f)) continue;
         const auto group = std::find(groups.begin(), groups.end(), lights[i].group) - groups.begin();
         tasks.push_back({int(i), std::size_t(group), multiplier});
@@ -228,7 +229,7 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
     result.groups = groups.size();
     result.values.assign(points.size() * groups.size(), Rgb(0.0f));
 
-    const std::vector<Task> tasks = translucency_tasks(lights.lights(), groups);
+    const std::vector<Task> tasks = light_tasks(lights.lights(), groups, options.component);
     if (tasks.empty() || points.size() == 0) return result;
 
     const EntryTable entry(transmittance);
@@ -264,7 +265,7 @@ std::vector<Ray> shadow_rays(const PointSet& points, const LightSampler& lights,
     std::vector<Ray> rays;
     Workspace work;
     for (const std::uint32_t point : spatial_order(points.positions)) {
-        for (const Task& task : translucency_tasks(lights.lights(), light_groups(lights.lights()))) {
+        for (const Task& task : light_tasks(lights.lights(), light_groups(lights.lights()), options.component)) {
             maker.make_rays(point, task.light, work);
             rays.insert(rays.end(), work.rays.begin(), work.rays.end());
         }

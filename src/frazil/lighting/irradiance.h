@@ -23,6 +23,7 @@ namespace frazil {
 struct IrradianceOptions {
     int samples = 64;  // per point and light, 1 to 2^20; a power of two is stratified best
     std::uint32_t seed = 0;
+    LightComponent component = LightComponent::translucency;  // whose multipliers the lights take
 };
 
 struct Irradiance {
