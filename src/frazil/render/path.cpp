@@ -29,7 +29,7 @@ struct PathTracer::Path {
     // Before the first vertex both are meaningless: `bounce` is 0.
     Rgb to_diffuse, to_specular;
     // The last vertex: lobe values over pdf, and the pdf for MIS.
-    BsdfValue last;
+    Scattering last;
 
     // Throughput to each of the two layers, with the last vertex's lobes weighted by a light's multipliers.
     std::pair<Rgb, Rgb> weights(float diffuse, float specular) const {
@@ -66,12 +66,13 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
-        Surface surface = resolver_.resolve(hit, path.ray.direction);
+        const Surface surface = resolver_.resolve(hit, path.ray.direction);
+        const Shader shader(surface, bodies_[surface.object].get());
         sampler.set_dimension(kDimensionsPerVertex * static_cast<std::uint32_t>(path.bounce + 1));
 
         // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
         bool passes_through = false;
-        const float opacity = surface_opacity(surface);
+        const float opacity = shader.opacity();
         if (opacity < 1.0f) {
             Sampler coin = sampler;
             coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(transparent_hits));
@@ -84,11 +85,6 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
             path.ray.t_min = 0.0f;
             continue;
         }
-        if (const auto* standard = std::get_if<StandardMaterial>(&surface.material->model);
-            standard && standard->normal.texture) {
-            surface.normal = mapped_normal(*standard, surface, scene_, hit, wo);
-        }
-
         if (!has_primary) {
             has_primary = true;
             const float depth = (surface.position - camera_ray.origin).dot(view_axis);
@@ -96,7 +92,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         }
 
         // What the surface itself gives: emission, and light that diffused through ice.
-        if (const Rgb emission = surface_emission(surface); emission != Rgb(0.0f)) {
+        if (const Rgb emission = shader.emission(); emission != Rgb(0.0f)) {
             if (path.bounce == 0) {
                 tile.add(pixel, Component::emission, 0, emission);
             } else {
@@ -107,7 +103,6 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         }
         request_gather(path, surface, wo, sampler, tile);
 
-        const Shader shader(surface, bodies_[surface.object].get());
         add_direct_light(path, surface, shader, wo, sampler, tile);
         if (path.bounce >= max_bounces_) return;
 
@@ -115,7 +110,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         V3f wi;
         const float u_lobe = sampler.next_1d();
         if (!shader.sample(wo, u_lobe, sampler.next_2d(), wi)) return;
-        BsdfValue value = shader.eval(wo, wi);
+        Scattering value = shader.eval(wo, wi);
         if (!(value.pdf > 0.0f)) return;
         value.diffuse /= value.pdf;
         value.specular /= value.pdf;
@@ -167,7 +162,7 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     const float u_pick = sampler.next_1d();
     const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
-    const BsdfValue value = shader.eval(wo, sample.direction);
+    const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[sample.light];
     const Rgb diffuse_lobe = value.diffuse * multiplier(light, LightComponent::diffuse);
     const Rgb specular_lobe = value.specular * multiplier(light, LightComponent::specular);

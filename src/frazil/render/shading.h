@@ -6,20 +6,17 @@
 
 #include <optional>
 
-#include "frazil/material/standard_bsdf.h"
+#include "frazil/material/standard.h"
 #include "frazil/render/bodies.h"
 #include "frazil/render/surface.h"
 
 namespace frazil {
 
-// The fraction of light that the surface stops: 1 but for cut-out standard materials.
-float surface_opacity(const Surface& surface);
-
-Rgb surface_emission(const Surface& surface);
-
-// The shading normal under the material's normal map.
-V3f mapped_normal(const StandardMaterial& material, const Surface& surface, const Scene& scene, const Hit& hit,
-                  const V3f& wo);
+// f * cos of the lobes of one pair of directions, and the density with which sample() would choose wi.
+struct Scattering {
+    Rgb diffuse = Rgb(0.0f), specular = Rgb(0.0f);
+    float pdf = 0.0f;
+};
 
 // The scattering of one surface, directions in world space.
 class Shader {
@@ -27,7 +24,11 @@ class Shader {
     // `body` is the surface's translucent body, null for other materials.
     Shader(const Surface& surface, const Body* body);
 
-    BsdfValue eval(const V3f& wo, const V3f& wi) const;
+    // The fraction of light that the surface stops: 1 but for cut-out standard materials.
+    float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
+    Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
+
+    Scattering eval(const V3f& wo, const V3f& wi) const;
     // False where the sample is lost.
     bool sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const;
 

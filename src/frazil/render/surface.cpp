@@ -7,14 +7,38 @@ V3f towards(const V3f& normal, const V3f& side) {
     return normal.dot(side) < 0.0f ? -normal : normal;
 }
 
-}  // namespace
-
+// The unit vector nearest to `normal` that has the viewer a little above its horizon.
 V3f bent_towards_viewer(const V3f& normal, const V3f& wo) {
     constexpr float kLeastCosine = 1e-3f;
     const float cosine = normal.dot(wo);
     if (cosine >= kLeastCosine) return normal;
     return (normal + wo * (kLeastCosine - cosine)).normalized();
 }
+
+// The shading normal turned, in the tangent frame of st, by a normal map's value.
+V3f mapped_normal(const Surface& surface, const Object& object, const Mesh& mesh, const Hit& hit,
+                  const V3f& tangent_space_normal) {
+    // The direction in which s grows, from the triangle's three corners.
+    const V3i& t = mesh.triangles[hit.triangle];
+    const V2f st0 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 0.0f});
+    const V2f d1 = mesh.uvs.at(mesh.triangles, hit.triangle, {1.0f, 0.0f}) - st0;
+    const V2f d2 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 1.0f}) - st0;
+    const float determinant = d1.x * d2.y - d1.y * d2.x;
+    if (determinant == 0.0f) return surface.normal;
+    const V3f e1 = mesh.positions[t.y] - mesh.positions[t.x];
+    const V3f e2 = mesh.positions[t.z] - mesh.positions[t.x];
+    V3f tangent;
+    object.local_to_world.multDirMatrix((e1 * d2.y - e2 * d1.y) / determinant, tangent);
+    tangent -= surface.normal * surface.normal.dot(tangent);
+    if (!(tangent.length2() > 0.0f)) return surface.normal;
+    tangent.normalize();
+    const V3f bitangent = surface.normal.cross(tangent) * (determinant < 0.0f ? -1.0f : 1.0f);
+    const V3f n =
+        tangent * tangent_space_normal.x + bitangent * tangent_space_normal.y + surface.normal * tangent_space_normal.z;
+    return n.length2() > 0.0f ? n.normalized() : surface.normal;
+}
+
+}  // namespace
 
 SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
     world_to_local_.reserve(scene.objects.size());
@@ -46,32 +70,12 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction) const {
     }
     if (!mesh.uvs.is_empty()) surface.st = mesh.uvs.at(mesh.triangles, hit.triangle, hit.uv);
     if (!mesh.colors.is_empty()) surface.display_color = mesh.colors.at(mesh.triangles, hit.triangle, hit.uv);
+    const auto* standard = std::get_if<StandardMaterial>(&surface.material->model);
+    if (standard && standard->normal.texture && !mesh.uvs.is_empty()) {
+        const V3f mapped = mapped_normal(surface, object, mesh, hit, eval_normal(standard->normal, surface.st));
+        surface.normal = bent_towards_viewer(mapped, wo);
+    }
     return surface;
-}
-
-V3f apply_normal_map(const Surface& surface, const Scene& scene, const Hit& hit, const V3f& tangent_space_normal) {
-    const Object& object = scene.objects[hit.placement];
-    const Mesh& mesh = scene.meshes[object.mesh];
-    if (mesh.uvs.is_empty()) return surface.normal;
-
-    // The direction in which s grows, from the triangle's three corners.
-    const V3i& t = mesh.triangles[hit.triangle];
-    const V2f st0 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 0.0f});
-    const V2f d1 = mesh.uvs.at(mesh.triangles, hit.triangle, {1.0f, 0.0f}) - st0;
-    const V2f d2 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 1.0f}) - st0;
-    const float determinant = d1.x * d2.y - d1.y * d2.x;
-    if (determinant == 0.0f) return surface.normal;
-    const V3f e1 = mesh.positions[t.y] - mesh.positions[t.x];
-    const V3f e2 = mesh.positions[t.z] - mesh.positions[t.x];
-    V3f tangent;
-    object.local_to_world.multDirMatrix((e1 * d2.y - e2 * d1.y) / determinant, tangent);
-    tangent -= surface.normal * surface.normal.dot(tangent);
-    if (!(tangent.length2() > 0.0f)) return surface.normal;
-    tangent.normalize();
-    const V3f bitangent = surface.normal.cross(tangent) * (determinant < 0.0f ? -1.0f : 1.0f);
-    const V3f n =
-        tangent * tangent_space_normal.x + bitangent * tangent_space_normal.y + surface.normal * tangent_space_normal.z;
-    return n.length2() > 0.0f ? n.normalized() : surface.normal;
 }
 
 }  // namespace frazil

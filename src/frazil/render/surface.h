@@ -34,10 +34,4 @@ class SurfaceResolver {
     std::vector<M44f> world_to_local_;
 };
 
-// The unit vector nearest to `normal` that has the viewer a little above its horizon.
-V3f bent_towards_viewer(const V3f& normal, const V3f& wo);
-
-// The shading normal turned, in the tangent frame of st, by a normal map's value (unit length not needed).
-V3f apply_normal_map(const Surface& surface, const Scene& scene, const Hit& hit, const V3f& tangent_space_normal);
-
 }  // namespace frazil
