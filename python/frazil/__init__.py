@@ -1,5 +1,29 @@
 """Frazil: renderer and look-development toolkit for glacier ice and other translucent matter."""
 
-from ._frazil import Mesh, PointSet, poisson_points, tessellated_points
+from ._frazil import (
+    Dipole,
+    Medium,
+    Mesh,
+    PointSet,
+    PointTree,
+    Ramp,
+    area_compensation,
+    fresnel_average,
+    fresnel_dielectric,
+    poisson_points,
+    tessellated_points,
+)
 
-__all__ = ["Mesh", "PointSet", "poisson_points", "tessellated_points"]
+__all__ = [
+    "Dipole",
+    "Medium",
+    "Mesh",
+    "PointSet",
+    "PointTree",
+    "Ramp",
+    "area_compensation",
+    "fresnel_average",
+    "fresnel_dielectric",
+    "poisson_points",
+    "tessellated_points",
+]

@@ -27,7 +27,7 @@ struct PathTracer::Path {
     Ray ray;
     // What light from the last vertex is worth to the camera, apart for paths whose first lobe was diffuse or specular.
     // Before the first vertex both are meaningless: `bounce` is 0.
-    Rgb to_diffuse, to_specular;
+    Rgb to_diffuse = Rgb(0.0f), to_specular = Rgb(0.0f);
     // The last vertex: lobe values over pdf, and the pdf for MIS.
     Scattering last;
 

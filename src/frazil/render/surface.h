@@ -14,10 +14,10 @@ namespace frazil {
 struct Surface {
     std::uint32_t object = 0;
     const Material* material = nullptr;
-    V3f position;
-    V3f geometric_normal;  // unit length, on the viewer's side
-    V3f normal;            // for shading, unit length, the viewer above it
-    V2f st;                // (0, 0) where the mesh has none
+    V3f position = V3f(0.0f);
+    V3f geometric_normal = V3f(0.0f);  // unit length, on the viewer's side
+    V3f normal = V3f(0.0f);            // for shading, unit length, the viewer above it
+    V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
     Rgb display_color = Rgb(0.18f);
 };
 

@@ -19,7 +19,7 @@ inline constexpr std::size_t kComponentCount = 5;
 // What the camera sees first along one sample.
 struct PrimaryHit {
     float depth = std::numeric_limits<float>::infinity();
-    V3f position, normal;
+    V3f position = V3f(0.0f), normal = V3f(0.0f);
     std::uint32_t object_id = 0;
 };
 
@@ -28,10 +28,10 @@ struct GatherRequest {
     std::uint32_t object = 0;
     std::uint32_t pixel = 0;
     bool is_primary = false;  // then `weight` is to translucency, else the light goes the way of its first reflection
-    V3f position;
-    Rgb weight, specular_weight;  // to translucency or diffuse; to specular
+    V3f position = V3f(0.0f);
+    Rgb weight = Rgb(0.0f), specular_weight = Rgb(0.0f);  // to translucency or diffuse; to specular
     // Light that enters right here, for the compensation that fills up; its light group.
-    Rgb entering;
+    Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;
 };
 
@@ -39,9 +39,9 @@ class Tile {
   public:
     Tile(std::size_t pixels, std::size_t groups)
         : groups_(groups),
-          light_(pixels * kComponentCount * groups),
-          normal_(pixels),
-          coverage_(pixels),
+          light_(pixels * kComponentCount * groups, Rgb(0.0f)),
+          normal_(pixels, V3f(0.0f)),
+          coverage_(pixels, Rgb(0.0f)),
           hits_(pixels),
           nearest_(pixels) {}
 
