@@ -31,7 +31,7 @@ CMAKE_CONFIG   := -Cbuild-dir=$(BUILD) -Ccmake.define.FRAZIL_BUILD_TESTS=ON
 .DELETE_ON_ERROR:
 
 help: ## List the targets
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 	@echo
 	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
 

@@ -1,5 +1,24 @@
 """Frazil: renderer and look-development toolkit for glacier ice and other translucent matter."""
 
-from ._frazil import Mesh
+import importlib
+from typing import Any
 
-__all__ = ["Mesh"]
+from ._frazil import Mesh
+from .warning import FrazilWarning
+
+# Names that need more than the core, and where they live: imported when first asked for.
+_LAZY = {"Film": ".film", "load_usd": ".usd", "render": ".rendering"}
+
+__all__ = ["Film", "FrazilWarning", "Mesh", "load_usd", "render"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'frazil' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})
