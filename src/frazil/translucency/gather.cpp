@@ -87,12 +87,12 @@ struct Cut {
         const float area = tree.areas[p] * share;
         const V3f& n = tree.normals[p];
         const float variance = estimator == Estimator::noise_free ? 0.25f * area * kInvPi : 0.0f;
-        list.sources.push_back({{center.x, center.y, center.z},
-                                {variance * (1.0f - n.x * n.x), variance * (1.0f - n.y * n.y),
-                                 variance * (1.0f - n.z * n.z), -variance * n.x * n.y, -variance * n.x * n.z,
-                                 -variance * n.y * n.z},
-                                {0.0f, 0.0f, 0.0f},
-                                area});
+        list.sources.push_back(
+            {{center.x, center.y, center.z},
+             {variance * (1.0f - n.x * n.x), variance * (1.0f - n.y * n.y), variance * (1.0f - n.z * n.z),
+              -variance * n.x * n.y, -variance * n.x * n.z, -variance * n.y * n.z},
+             {0.0f, 0.0f, 0.0f},
+             area});
         add_powers(&tree.irradiance[p * tree.groups].x, area);
     }
 

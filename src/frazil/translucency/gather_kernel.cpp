@@ -38,17 +38,24 @@ void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceL
             const float along = dx * (cov[0] * dx + 2.0f * (cov[3] * dy + cov[4] * dz)) +
                                 dy * (cov[1] * dy + 2.0f * cov[5] * dz) + dz * cov[2] * dz;
             const float lean = 2.0f * (dx * off[0] + dy * off[1] + dz * off[2]);
-            const float r = ramp.is_flat ? 0.0f : std::sqrt(q);
+            // Mean and variance of the distance over the source.
+            const float variance = std::max(0.0f, along / (q + trace + 1e-30f));
+            const float mean_r = std::sqrt(std::max(0.0f, q + trace + lean - variance));
+            const float half_width = std::sqrt(3.0f * variance) + 1e-6f * mean_r + 1e-30f;
             for (int c = 0; c < 3; ++c) {
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;
                 float lit = even + f.slope * lean;
                 if (!ramp.is_flat) {
-                    float color = ramp.first[c];
+                    // Average each hinge over a uniform spread of distances.
+                    float color = ramp.first[c], slope = 0.0f;
                     for (const auto& hinge : ramp.hinges) {
-                        color += hinge.slope_change[c] * std::max(0.0f, r - hinge.distance);
+                        const float x = mean_r - hinge.distance;
+                        const float part = std::clamp(0.5f + 0.5f * x / half_width, 0.0f, 1.0f);
+                        color += hinge.slope_change[c] * (part * part * half_width + std::max(0.0f, x - half_width));
+                        slope += hinge.slope_change[c] * part;
                     }
-                    lit *= color;
+                    lit = lit * color + 2.0f * std::sqrt(q) * f.slope * variance * slope;
                 }
                 block.coverage[c][lane] += even * source.area;
                 for (std::size_t g = 0; g < groups; ++g) {
