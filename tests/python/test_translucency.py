@@ -93,7 +93,7 @@ def test_bad_albedo():
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-@pytest.mark.parametrize(("groups", "has_ramp", "fine"), [(1, False, 3e-4), (3, True, 2e-3)])
+@pytest.mark.parametrize(("groups", "has_ramp", "fine"), [(1, False, 1e-3), (3, True, 2e-3)])
 def test_gather_equals_the_sum_in_double(estimator, groups, has_ramp, fine):
     points = sphere(3000, 0.35)
     rng = np.random.default_rng(1)

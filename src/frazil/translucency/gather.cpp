@@ -117,7 +117,8 @@ struct Cut {
             stack.pop_back();
             const TreeNode& node = tree.nodes[index];
             const float largest = rule.largest_radius(squared_distance(box, node.center));
-            if (node.point_count > 1 && node.radius <= largest) {
+            const float reach = estimator == Estimator::noise_free ? 2.0f * std::sqrt(node.footprint) : 0.0f;
+            if (node.point_count > 1 && node.radius + reach <= largest) {
                 add_cluster(index);
             } else if (node.child_count > 0) {
                 for (std::uint32_t k = node.child_count; k-- > 0;) stack.push_back(node.first_child + k);
