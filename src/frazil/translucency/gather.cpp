@@ -177,7 +177,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
             box.extendBy(p);
         }
         cut.build(box);
-        add_sources(tree.table, ramp, cut.list, tree.groups, block);
+        add_sources_scalar(tree.table, ramp, cut.list, tree.groups, block);
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t lane = i - begin, to = order[i].second;
             for (int c = 0; c < 3; ++c) {

@@ -23,14 +23,17 @@ RampHinges hinges_of(const Ramp& ramp, const Rgb& scale) {
     return out;
 }
 
-void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
-                 BlockSums& block) {
+void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
+                        BlockSums& block) {
     const std::size_t row = 3 * groups;
-    for (std::size_t s = 0; s < list.sources.size(); ++s) {
-        const Source& source = list.sources[s];
-        const auto& cov = source.covariance;
-        const auto& off = source.power_offset;
-        for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+    std::vector<double> exitance(row);
+    for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+        std::fill(exitance.begin(), exitance.end(), 0.0);
+        double coverage[3] = {0.0, 0.0, 0.0};
+        for (std::size_t s = 0; s < list.sources.size(); ++s) {
+            const Source& source = list.sources[s];
+            const auto& cov = source.covariance;
+            const auto& off = source.power_offset;
             const float dx = source.center[0] - block.x[lane], dy = source.center[1] - block.y[lane],
                         dz = source.center[2] - block.z[lane];
             const float q = dx * dx + dy * dy + dz * dz;
@@ -57,11 +60,15 @@ void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceL
                     }
                     lit = lit * color + 2.0f * std::sqrt(q) * f.slope * variance * slope;
                 }
-                block.coverage[c][lane] += even * source.area;
+                coverage[c] += double(even) * source.area;
                 for (std::size_t g = 0; g < groups; ++g) {
-                    block.exitance[(3 * g + c) * kBlockLanes + lane] += lit * list.powers[s * row + 3 * g + c];
+                    exitance[3 * g + c] += double(lit) * list.powers[s * row + 3 * g + c];
                 }
             }
+        }
+        for (int c = 0; c < 3; ++c) block.coverage[c][lane] += static_cast<float>(coverage[c]);
+        for (std::size_t c = 0; c < row; ++c) {
+            block.exitance[c * kBlockLanes + lane] += static_cast<float>(exitance[c]);
         }
     }
 }

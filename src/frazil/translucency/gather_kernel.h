@@ -56,7 +56,7 @@ struct RampHinges {
 RampHinges hinges_of(const Ramp& ramp, const Rgb& scale);
 
 // Add every source's share to the block's sums.
-void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
-                 BlockSums& block);
+void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
+                        BlockSums& block);
 
 }  // namespace frazil
