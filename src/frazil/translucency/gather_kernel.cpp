@@ -37,10 +37,10 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
             const float dx = source.center[0] - block.x[lane], dy = source.center[1] - block.y[lane],
                         dz = source.center[2] - block.z[lane];
             const float q = dx * dx + dy * dy + dz * dz;
-            const float trace = cov[0] + cov[1] + cov[2];
-            const float along = dx * (cov[0] * dx + 2.0f * (cov[3] * dy + cov[4] * dz)) +
-                                dy * (cov[1] * dy + 2.0f * cov[5] * dz) + dz * cov[2] * dz;
-            const float lean = 2.0f * (dx * off[0] + dy * off[1] + dz * off[2]);
+            const float trace = source.trace;
+            const float along =
+                dx * (cov[0] * dx + cov[3] * dy + cov[4] * dz) + dy * (cov[1] * dy + cov[5] * dz) + dz * cov[2] * dz;
+            const float lean = dx * off[0] + dy * off[1] + dz * off[2];
             // Mean and variance of the distance over the source.
             const float variance = std::max(0.0f, along / (q + trace + 1e-30f));
             const float mean_r = std::sqrt(std::max(0.0f, q + trace + lean - variance));
