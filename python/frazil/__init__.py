@@ -1,5 +1,5 @@
 """Frazil: renderer and look-development toolkit for glacier ice and other translucent matter."""
 
-from ._frazil import Mesh
+from ._frazil import Mesh, PointSet, poisson_points, tessellated_points
 
-__all__ = ["Mesh"]
+__all__ = ["Mesh", "PointSet", "poisson_points", "tessellated_points"]
