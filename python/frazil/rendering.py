@@ -143,7 +143,7 @@ def _stoppable(work: Callable[[Progress, Callable[[], bool]], Any], progress: Pr
 
     Signals are heard only by the main thread while it runs Python, so it must not be the one that computes.
     """
-    stop = threading.Event()
+    stop, done = threading.Event(), threading.Event()
     outcome: dict[str, Any] = {}
 
     def report(stage: str, fraction: float) -> None:
@@ -160,15 +160,19 @@ def _stoppable(work: Callable[[Progress, Callable[[], bool]], Any], progress: Pr
             outcome["result"] = work(report, stop.is_set)
         except BaseException as error:
             outcome.setdefault("error", error)
+        finally:
+            done.set()
 
     worker = threading.Thread(target=run, name="frazil render", daemon=True)
     worker.start()
     try:
-        worker.join()
+        done.wait()  # not join(): interrupted, that takes a running thread for a stopped one
     except BaseException:
         stop.set()
-        worker.join()
+        done.wait()
         raise
+    finally:
+        worker.join()
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]
