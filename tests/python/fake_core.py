@@ -39,18 +39,31 @@ class Core:
         self.steps = steps
         self.on_step = on_step
 
-    def render(self, scene, options, report, should_stop):
+    def render(self, scene, *, progress, **options):
         self.options = options
-        self.frames.append(scene.frame if scene else None)
+        self.frames.append(scene.frame)
         for stage in ("points", "bake", "tree", "render"):
             for step in range(self.steps):
-                report(stage, (step + 1) / self.steps)
+                progress(stage, (step + 1) / self.steps)
                 if self.on_step:
                     self.on_step(stage, step)
-                if should_stop():
-                    raise RuntimeError("cancelled")
         stats = {"points": 10, "nodes": 3, "dropped_samples": 2, "seconds": {"points": 0.1, "render": 0.2}}
         return SimpleNamespace(layers=layers(options["width"], options["height"]), stats=stats)
+
+
+def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"):
+    """What the renderer and the command line ask of a scene."""
+    return SimpleNamespace(
+        file=str(file),
+        frame=frame,
+        camera=SimpleNamespace(path=camera),
+        objects=[SimpleNamespace(path="/World/Ice"), SimpleNamespace(path="/World/Rock")],
+        render_settings=SimpleNamespace(resolution=resolution),
+    )
+
+
+def load_usd(path, frame=None, camera=None):
+    return scene(frame, camera or "/World/Camera", file=path)
 
 
 def install(monkeypatch, core):
@@ -58,11 +71,6 @@ def install(monkeypatch, core):
     import frazil._frazil
 
     import frazil.usd
-
-    def load_usd(path, frame=None, camera=None, **_):
-        return SimpleNamespace(
-            frame=frame, camera_path=camera or "/World/Camera", object_paths=["/World/Ice", "/World/Rock"]
-        )
 
     monkeypatch.setattr(frazil._frazil, "render", core.render, raising=False)
     monkeypatch.setattr(frazil._frazil, "aov_table", aov_table, raising=False)

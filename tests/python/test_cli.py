@@ -122,7 +122,7 @@ def test_chosen_layers_only(capsys, core, scene, tmp_path):
 
 def test_the_resolution_of_the_stage_is_the_default(capsys, core, scene, tmp_path, monkeypatch):
     def load_usd(path, frame=None, camera=None):
-        return SimpleNamespace(frame=frame, resolution=(30, 20))
+        return fake_core.scene(resolution=(30, 20))
 
     monkeypatch.setattr(fz.usd, "load_usd", load_usd)
     assert run(capsys, "render", scene, "-o", tmp_path / "a.exr", "-q").status == 0
@@ -212,7 +212,7 @@ def test_unwritable_output_is_told_before_the_render(capsys, core, scene, tmp_pa
     ],
 )
 def test_what_the_core_refuses_is_one_line_and_status_1(capsys, core, scene, tmp_path, monkeypatch, error, words):
-    def render(*_):
+    def render(*_, **__):
         raise error
 
     monkeypatch.setattr(fz._frazil, "render", render)
@@ -227,7 +227,7 @@ def test_warnings_are_single_lines_told_once(capsys, core, scene, tmp_path, monk
     def load_usd(path, frame=None, camera=None):
         warnings.warn("/World/Cloth: NurbsPatch is not supported.\nLeft out.", fz.FrazilWarning, stacklevel=2)
         warnings.warn("something in a library", DeprecationWarning, stacklevel=2)
-        return SimpleNamespace(frame=frame)
+        return fake_core.scene(frame)
 
     monkeypatch.setattr(fz.usd, "load_usd", load_usd)
     options = ["--resolution", "4x4", "--frames", "1-3", "--quiet"]

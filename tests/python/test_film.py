@@ -95,7 +95,7 @@ def test_bright_layers_warn_and_stay_float(tmp_path, film):
 def test_options_reach_the_core(monkeypatch):
     core = fake_core.Core()
     fake_core.install(monkeypatch, core)
-    film = fz.render(None, resolution=(20, 10), samples=5, seed=9, threads=2, spacing=0.1, estimator="sum")
+    film = fz.render(fake_core.scene(), resolution=(20, 10), samples=5, seed=9, threads=2, spacing=0.1, estimator="sum")
     assert (film.width, film.height) == (20, 10)
     expected = {"samples": 5, "seed": 9, "threads": 2, "spacing": 0.1, "estimator": "sum"}
     assert {key: core.options[key] for key in expected} == expected
@@ -106,7 +106,7 @@ def test_options_reach_the_core(monkeypatch):
 
 def test_progress_is_told():
     told = []
-    fz.render(None, resolution=(4, 4), progress=lambda stage, fraction: told.append((stage, fraction)))
+    fz.render(fake_core.scene(), resolution=(4, 4), progress=lambda stage, fraction: told.append((stage, fraction)))
     assert told[0] == ("points", 0.25)
     assert told[-1] == ("render", 1.0)
 
@@ -116,7 +116,7 @@ def test_what_progress_raises_stops_the_render():
         raise LookupError(stage)
 
     with pytest.raises(LookupError, match="points"):
-        fz.render(None, resolution=(4, 4), progress=refuse)
+        fz.render(fake_core.scene(), resolution=(4, 4), progress=refuse)
 
 
 def test_interrupt_stops_at_the_next_step(monkeypatch):
@@ -130,11 +130,11 @@ def test_interrupt_stops_at_the_next_step(monkeypatch):
 
     fake_core.install(monkeypatch, fake_core.Core(steps=1000, on_step=on_step))
     with pytest.raises(KeyboardInterrupt):
-        fz.render(None, resolution=(4, 4))
+        fz.render(fake_core.scene(), resolution=(4, 4))
     assert len(steps) < 50
     assert not any(thread.name == "frazil render" for thread in threading.enumerate())
 
 
 def test_a_picture_that_cannot_fit_is_refused():
     with pytest.raises(MemoryError, match=r"picture must fit .* got 65536x65536.* Lower --resolution"):
-        fz.render(None, resolution=(65536, 65536))
+        fz.render(fake_core.scene(), resolution=(65536, 65536))

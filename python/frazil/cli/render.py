@@ -3,7 +3,6 @@
 import json
 import math
 import time
-from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
@@ -145,7 +144,6 @@ def render_command(
             reporter("load", 1.0)
 
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
-            film.metadata |= _provenance(scene, loaded, time_code)
 
             start = time.perf_counter()
             film.save(exr, compression, layers=layers)
@@ -217,22 +215,11 @@ def _refuse_unwritable(*paths: Path | None) -> None:
 
 def _authored_resolution(loaded: Any) -> tuple[int, int]:
     """The resolution that the stage's render settings ask for, else the default."""
-    resolution = getattr(loaded, "resolution", None)
-    return (int(resolution[0]), int(resolution[1])) if resolution else DEFAULT_RESOLUTION
+    settings = loaded.render_settings
+    return (settings and settings.resolution) or DEFAULT_RESOLUTION
 
 
 # ---- what is told ----------------------------------------------------------------------------------------------------
-
-
-def _provenance(scene: Path, loaded: Any, time_code: float | None) -> dict[str, Any]:
-    """Where a picture comes from, for the EXR's header."""
-    return {
-        "DateTime": datetime.now().strftime("%Y:%m:%d %H:%M:%S"),
-        "frazil:scene": str(scene),
-        "frazil:frame": "default" if time_code is None else float(time_code),
-        "frazil:camera": getattr(loaded, "camera_path", None),
-        "frazil:objects": getattr(loaded, "object_paths", None),
-    }
 
 
 def _record(film: Any, time_code: float | None, exr: Path, seconds_load: float, seconds_save: float) -> dict[str, Any]:
