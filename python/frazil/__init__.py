@@ -3,13 +3,41 @@
 import importlib
 from typing import Any
 
-from ._frazil import Mesh
+from ._frazil import (
+    Dipole,
+    Medium,
+    Mesh,
+    PointSet,
+    PointTree,
+    Ramp,
+    area_compensation,
+    fresnel_average,
+    fresnel_dielectric,
+    poisson_points,
+    tessellated_points,
+)
 from .warning import FrazilWarning
 
 # Names that need more than the core, and where they live: imported when first asked for.
 _LAZY = {"Film": ".film", "load_usd": ".usd", "render": ".rendering"}
 
-__all__ = ["Film", "FrazilWarning", "Mesh", "load_usd", "render"]
+__all__ = [
+    "Dipole",
+    "Film",
+    "FrazilWarning",
+    "Medium",
+    "Mesh",
+    "PointSet",
+    "PointTree",
+    "Ramp",
+    "area_compensation",
+    "fresnel_average",
+    "fresnel_dielectric",
+    "load_usd",
+    "poisson_points",
+    "render",
+    "tessellated_points",
+]
 
 
 def __getattr__(name: str) -> Any:

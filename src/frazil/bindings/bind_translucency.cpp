@@ -1,7 +1,288 @@
+#include <cmath>
+#include <functional>
+
 #include "frazil/bindings/bindings.h"
+#include "frazil/translucency/compensation.h"
+#include "frazil/translucency/fresnel.h"
+#include "frazil/translucency/point_tree.h"
 
 namespace frazil {
+namespace {
 
-void bind_translucency(nb::module_&) {}
+// Move values into a numpy array that owns them.
+template <class T>
+nb::object own(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
+    auto* kept = new std::vector<T>(std::move(values));
+    nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, float>(reinterpret_cast<float*>(kept->data()), shape, owner));
+}
+
+nb::object to_array(const Rgb& c) {
+    return own(std::vector<float>{c.x, c.y, c.z}, {3});
+}
+
+// One number or three.
+Rgb to_rgb(nb::handle value, const char* what) {
+    float number;
+    if (nb::try_cast<float>(value, number)) return Rgb(number);
+    std::vector<float> three;
+    if (!nb::try_cast<std::vector<float>>(value, three) || three.size() != 3) {
+        throw ValueError(str(what, " must be one number or three, got ", nb::repr(value).c_str(), "."));
+    }
+    return {three[0], three[1], three[2]};
+}
+
+// Radii as (n,) floats; a single number is an array of one.
+std::vector<float> to_radii(nb::handle value, const char* what) {
+    float number;
+    if (nb::try_cast<float>(value, number)) return {number};
+    const nb::object asarray = nb::module_::import_("numpy").attr("asarray");
+    const auto array = nb::cast<FloatArray>(asarray(value, "float32"));
+    if (array.ndim() != 1) throw ValueError(str(what, " must have shape (n,), got ", array.ndim(), " dimensions."));
+    return std::vector<float>(array.data(), array.data() + array.size());
+}
+
+nb::object map_radii(nb::handle value, const char* what, const std::function<Rgb(float)>& f) {
+    const std::vector<float> radii = to_radii(value, what);
+    std::vector<Rgb> out;
+    out.reserve(radii.size());
+    for (const float r : radii) {
+        if (!(r >= 0.0f)) throw ValueError(str(what, " must be >= 0, got ", r, ". It is a distance in metres."));
+        out.push_back(f(r));
+    }
+    const std::size_t n = out.size();
+    return own(std::move(out), {n, 3});
+}
+
+FloatArray as_floats(nb::handle value) {
+    const nb::module_ numpy = nb::module_::import_("numpy");
+    return nb::cast<FloatArray>(numpy.attr("ascontiguousarray")(value, "float32"));
+}
+
+std::vector<float> to_scalars(nb::handle value) {
+    const FloatArray array = as_floats(value);
+    return std::vector<float>(array.data(), array.data() + array.size());
+}
+
+// A PointSet, or anything with positions, normals, areas and spacing.
+PointSet to_points(nb::handle object) {
+    PointSet points;
+    if (nb::isinstance<PointSet>(object)) return nb::cast<const PointSet&>(object);
+    for (const char* name : {"positions", "normals", "areas"}) {
+        if (!nb::hasattr(object, name)) {
+            throw ValueError(str("PointTree: points must be a PointSet or have positions, normals and areas, got ",
+                                 nb::repr(object.type()).c_str(), "."));
+        }
+    }
+    points.positions = to_vectors3(as_floats(object.attr("positions")), "PointTree: positions");
+    points.normals = to_vectors3(as_floats(object.attr("normals")), "PointTree: normals");
+    points.areas = to_scalars(object.attr("areas"));
+    if (nb::hasattr(object, "spacing")) points.spacing = nb::cast<float>(object.attr("spacing"));
+    return points;
+}
+
+// Irradiance (N, 3) or (N, G, 3), and its G.
+std::pair<std::vector<Rgb>, std::size_t> to_irradiance(nb::handle object) {
+    const FloatArray array = as_floats(object);
+    const std::size_t dimensions = array.ndim();
+    if ((dimensions != 2 && dimensions != 3) || array.shape(dimensions - 1) != 3) {
+        std::string shape;
+        for (std::size_t i = 0; i < dimensions; ++i) shape += str(i ? ", " : "", array.shape(i));
+        throw ValueError(str("PointTree: irradiance must have shape (N, 3) or (N, G, 3), got (", shape, ")."));
+    }
+    const auto* begin = reinterpret_cast<const Rgb*>(array.data());
+    return {std::vector<Rgb>(begin, begin + array.size() / 3), dimensions == 3 ? array.shape(1) : 1};
+}
+
+Estimator estimator_named(const std::string& name) {
+    if (name == "noise_free") return Estimator::noise_free;
+    if (name == "sum") return Estimator::sum;
+    throw ValueError(str("PointTree: estimator must be 'noise_free' or 'sum', got '", name, "'."));
+}
+
+CompensationMode mode_named(const std::string& name) {
+    if (name == "off") return CompensationMode::off;
+    if (name == "ratio") return CompensationMode::ratio;
+    if (name == "conserve") return CompensationMode::conserve;
+    if (name == "fill") return CompensationMode::fill;
+    if (name == "linear") return CompensationMode::linear;
+    throw ValueError(
+        str("area_compensation: mode must be off, ratio, conserve, fill or linear, got '", name, "'."));
+}
+
+template <class Kind>
+void bind_profile(nb::module_& module, const char* name, const char* doc) {
+    nb::class_<Kind>(module, name, doc)
+        .def(nb::init<const Medium&>(), "medium"_a)
+        .def(
+            "reflectance",
+            [](const Kind& self, nb::handle r) {
+                const Profile profile(self);
+                return map_radii(r, "reflectance: r", [&](float x) { return reflectance(profile, x); });
+            },
+            "r"_a, "Rd(r) in 1/m², (n, 3), for distances r (n,) in metres.")
+        .def(
+            "within",
+            [](const Kind& self, nb::handle radius) {
+                const Profile profile(self);
+                return map_radii(radius, "within: R", [&](float x) { return within(profile, x); });
+            },
+            "R"_a, "F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.")
+        .def_prop_ro(
+            "albedo", [](const Kind& self) { return to_array(albedo(Profile(self))); },
+            "Total diffuse reflectance Rd_total = F(inf), (3,).")
+        .def_prop_ro("medium", [](const Kind& self) { return self.medium; });
+}
+
+Profile to_profile(nb::handle object) {
+    if (nb::isinstance<Dipole>(object)) return nb::cast<const Dipole&>(object);
+    throw ValueError(str("profile must be a Dipole, got ", nb::repr(object.type()).c_str(), "."));
+}
+
+}  // namespace
+
+void bind_translucency(nb::module_& module) {
+    module.def("fresnel_dielectric", &fresnel_dielectric, "cos_theta"_a, "eta"_a,
+               "Reflected fraction of unpolarised light; eta = index it would enter / index it is in.");
+    module.def("fresnel_average", &fresnel_average, "eta"_a, "2 ∫ F(cos) cos dcos: what comes from all around.");
+
+    nb::class_<Medium>(module, "Medium",
+                       "What a translucent body is made of.\n\n"
+                       "Parameters\n----------\n"
+                       "sigma_s_prime : (3,) or number, 1/m, >= 0. Reduced scattering coefficient.\n"
+                       "sigma_a : (3,) or number, 1/m, >= 0. Absorption coefficient.\n"
+                       "eta : index of refraction relative to the outside, 1 to 4; ice is 1.31.\n\n"
+                       "Raises\n------\nValueError\n    For coefficients that are negative, NaN, or both zero.")
+        .def(
+            "__init__",
+            [](Medium* self, nb::handle sigma_s_prime, nb::handle sigma_a, float eta) {
+                const Medium medium{to_rgb(sigma_s_prime, "Medium: sigma_s_prime"), to_rgb(sigma_a, "Medium: sigma_a"),
+                                    eta};
+                check_medium(medium, "Medium");
+                new (self) Medium(medium);
+            },
+            "sigma_s_prime"_a, "sigma_a"_a, "eta"_a = 1.31f)
+        .def_static(
+            "from_albedo",
+            [](nb::handle albedo, nb::handle mean_free_path, float eta) {
+                return medium_from_albedo(to_rgb(albedo, "Medium: albedo"),
+                                          to_rgb(mean_free_path, "Medium: mean_free_path"), eta);
+            },
+            "albedo"_a, "mean_free_path"_a, "eta"_a = 1.31f,
+            "The medium whose dipole has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path\n"
+            "`mean_free_path` = 1/(sigma_s_prime + sigma_a), in metres.")
+        .def_prop_ro("sigma_s_prime", [](const Medium& m) { return to_array(m.sigma_s_prime); })
+        .def_prop_ro("sigma_a", [](const Medium& m) { return to_array(m.sigma_a); })
+        .def_ro("eta", &Medium::eta)
+        .def_prop_ro(
+            "mean_free_path",
+            [](const Medium& m) {
+                return to_array(Rgb(1.0f) / (m.sigma_s_prime + m.sigma_a));
+            },
+            "1/(sigma_s_prime + sigma_a), (3,), metres.")
+        .def("__repr__", [](const Medium& m) {
+            return str("Medium(sigma_s_prime=(", m.sigma_s_prime.x, ", ", m.sigma_s_prime.y, ", ", m.sigma_s_prime.z,
+                       "), sigma_a=(", m.sigma_a.x, ", ", m.sigma_a.y, ", ", m.sigma_a.z, "), eta=", m.eta, ")");
+        });
+
+    bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.");
+
+    nb::class_<Ramp>(module, "Ramp",
+                     "A colour for every distance between where light enters and where it leaves.\n\n"
+                     "Parameters\n----------\n"
+                     "distances : (K,) >= 0, increasing, metres; or mean free paths where mean_free_path is given.\n"
+                     "colors : (K, 3) >= 0, factors; linear between knots, constant outside.\n"
+                     "preserve_energy : scale each channel so that the total diffuse reflectance stays.\n"
+                     "mean_free_path : metres that one unit of distance stands for.")
+        .def(
+            "__init__",
+            [](Ramp* self, nb::handle distances, nb::handle colors, bool preserve_energy, double mean_free_path) {
+                if (!(mean_free_path > 0.0 && std::isfinite(mean_free_path))) {
+                    throw ValueError(str("Ramp: mean_free_path must be > 0, got ", mean_free_path, "."));
+                }
+                Ramp ramp{to_radii(distances, "Ramp: distances"), to_vectors3(as_floats(colors), "Ramp: colors"),
+                          preserve_energy};
+                check_ramp(ramp, "Ramp");
+                if (ramp.is_empty()) throw ValueError("Ramp: distances must hold at least one knot, got none.");
+                new (self) Ramp(in_metres(ramp, mean_free_path));
+            },
+            "distances"_a, "colors"_a, "preserve_energy"_a = false, "mean_free_path"_a = 1.0)
+        .def("eval", [](const Ramp& self, nb::handle r) {
+            return map_radii(r, "Ramp: r", [&](float x) { return eval(self, x); });
+        }, "r"_a, "The factors at distances r (n,) in metres, (n, 3); preserve_energy is not in them.");
+
+    nb::class_<Gathered>(module, "Gathered", "What a gather returns.")
+        .def_prop_ro("exitance",
+                     [](Gathered& self) {
+                         return view(reinterpret_cast<float*>(self.exitance.data()),
+                                     {self.coverage.size(), self.groups, 3}, nb::find(self));
+                     })
+        .def_prop_ro("coverage", [](Gathered& self) {
+            return view(reinterpret_cast<float*>(self.coverage.data()), {self.coverage.size(), 3}, nb::find(self));
+        });
+
+    nb::class_<PointTree>(module, "PointTree",
+                          "The octree of points with their irradiance.\n\n"
+                          "Parameters\n----------\n"
+                          "points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).\n"
+                          "irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.\n"
+                          "profile : Dipole.\n"
+                          "ramp : Ramp, optional.\n\n"
+                          "Safe to gather from by many threads at once.")
+        .def(
+            "__init__",
+            [](PointTree* self, nb::handle points, nb::handle irradiance, nb::handle profile, const Ramp* ramp) {
+                PointSet set = to_points(points);
+                auto [values, groups] = to_irradiance(irradiance);
+                const Profile kind = to_profile(profile);
+                const Ramp shade = ramp ? *ramp : Ramp{};
+                nb::gil_scoped_release release;
+                new (self) PointTree(set, std::move(values), groups, kind, shade);
+            },
+            "points"_a, "irradiance"_a, "profile"_a, "ramp"_a = nb::none())
+        .def(
+            "gather",
+            [](const PointTree& self, nb::handle positions, float tolerance, const std::string& estimator) {
+                const std::vector<V3f> where = to_vectors3(as_floats(positions), "PointTree: positions");
+                const GatherOptions options{tolerance, estimator_named(estimator)};
+                nb::gil_scoped_release release;
+                return self.gather(where.data(), where.size(), options);
+            },
+            "positions"_a, "tolerance"_a = 0.01f, "estimator"_a = "noise_free",
+            "Exitance and coverage at M positions (M, 3), in any order.\n\n"
+            "Returns an object with exitance (M, G, 3) and coverage (M, 3).")
+        .def(
+            "gather_exact",
+            [](const PointTree& self, nb::handle positions, const std::string& estimator) {
+                const std::vector<V3f> where = to_vectors3(as_floats(positions), "PointTree: positions");
+                const Estimator kind = estimator_named(estimator);
+                nb::gil_scoped_release release;
+                return self.gather_exact(where.data(), where.size(), kind);
+            },
+            "positions"_a, "estimator"_a = "noise_free",
+            "The same over every point in double precision: slow, to compare with.")
+        .def_prop_ro("point_count", &PointTree::point_count)
+        .def_prop_ro("node_count", &PointTree::node_count)
+        .def_prop_ro("dropped_count", &PointTree::dropped_count, "Points left out for their non-finite irradiance.");
+
+    module.def(
+        "area_compensation",
+        [](nb::handle coverage, nb::handle profile, const std::string& mode, float limit, float strength,
+           bool by_luminance) {
+            const Rgb total = albedo(to_profile(profile));
+            const Compensation compensation{mode_named(mode), limit, strength, by_luminance};
+            check_compensation(compensation, "area_compensation");
+            std::vector<Rgb> gain = to_vectors3(as_floats(coverage), "area_compensation: coverage");
+            const bool is_fill = compensation.mode == CompensationMode::fill;
+            for (Rgb& w : gain) {
+                w = is_fill ? fill_amount(compensation, w, total) : compensation_gain(compensation, w, total);
+            }
+            const std::size_t n = gain.size();
+            return own(std::move(gain), {n, 3});
+        },
+        "coverage"_a, "profile"_a, "mode"_a = "ratio", "limit"_a = 8.0f, "strength"_a = 1.0f, "by_luminance"_a = false,
+        "Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to add\n"
+        "per unit of irradiance at the shading point.");
+}
 
 }  // namespace frazil

@@ -1,12 +1,14 @@
 // A lat-long image of radiance from all around, with importance sampling.
-// Model: piecewise-constant 2-D distribution over luminance times sin(theta) [PBRT4, Section 12.5], evaluated with
-//   bilinear interpolation; pdf() is exact for sample().
+// Model: piecewise-constant density per pixel, proportional to the mean luminance of the bilinear lookup over it and to
+//   the solid angle that it covers [PBRT4, Section 12.5]; no direction that gives light has density 0; pdf() is exact
+//   for sample().
 // Units: radiance; directions in the light's own frame: row 0 is +y, the centre of the image +z, and +x lies left of
 // the
 //   centre (OpenEXR's latitude-longitude map, which UsdLuxDomeLight follows).
-// Valid: any image of finite pixels >= 0, at least 1 x 1; a black one samples uniformly.
+// Valid: any image of finite pixels, at least 1 x 1; negative ones subtract; a black one samples uniformly.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "frazil/base/vec.h"
@@ -27,9 +29,14 @@ class Environment {
     Rgb average() const { return average_; }
 
   private:
+    // Position of a direction in pixels: column in [0, width), row in [0, height).
+    V2f pixel_of(const V3f& direction) const;
+    float pdf_of_pixel(int column, int row) const;
+
     int width_, height_;
     std::vector<Rgb> pixels_;
-    std::vector<float> marginal_cdf_, conditional_cdf_;
+    std::vector<float> marginal_cdf_, conditional_cdf_;  // height + 1; height rows of width + 1
+    std::vector<float> row_cosine_;                      // cos(theta) at the upper edge of each row; height + 1
     Rgb average_;
 };
 

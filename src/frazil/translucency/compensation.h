@@ -3,7 +3,7 @@
 // exact W on closed forms: sphere F(2R)/F(inf), cone apex sin(beta), polyhedron vertex (sum of face angles)/2pi.
 #pragma once
 
-#include <vector>
+#include <string>
 
 #include "frazil/base/vec.h"
 #include "frazil/translucency/profile.h"
@@ -22,7 +22,11 @@ struct Compensation {
     CompensationMode mode = CompensationMode::ratio;
     float limit = 8.0f;     // largest gain, >= 1
     float strength = 1.0f;  // 0 = off, 1 = full
+    bool by_luminance = false;  // one factor for all channels, from luminances
 };
+
+// Refuse limit < 1 and strength outside 0..1: ValueError beginning with `path`.
+void check_compensation(const Compensation& compensation, const std::string& path);
 
 // The gain of M for one shading point. `fill` adds instead of multiplying: see fill_amount.
 Rgb compensation_gain(const Compensation& compensation, const Rgb& coverage, const Rgb& albedo);

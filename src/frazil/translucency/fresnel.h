@@ -11,5 +11,7 @@ float fresnel_dielectric(float cos_theta, float eta);
 
 // 2 ∫ F(cos) cos dcos: the reflected fraction of light that comes from all around. 32-point Gauss-Legendre.
 float fresnel_average(float eta);
+// The same in double precision.
+double fresnel_average_exact(double eta);
 
 }  // namespace frazil

@@ -35,6 +35,8 @@ struct Gathered {
 
 class PointTree {
   public:
+    struct Impl;
+
     // `irradiance` is (N, groups), row by row: irradiance[k * groups + g]. ValueError where sizes disagree.
     PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
               const Ramp& ramp = {});
@@ -43,7 +45,11 @@ class PointTree {
     PointTree& operator=(PointTree&&) noexcept;
 
     // Gather at M positions, in any order; nearby ones share a traversal.
+    // ValueError for a tolerance <= 0 or positions that are not finite.
     Gathered gather(const V3f* positions, std::size_t count, const GatherOptions& options = {}) const;
+
+    // The same without clusters and tables: every point, in double precision. Slow; what tests compare with.
+    Gathered gather_exact(const V3f* positions, std::size_t count, Estimator estimator = Estimator::noise_free) const;
 
     const Profile& profile() const;
     std::size_t point_count() const;
@@ -51,7 +57,6 @@ class PointTree {
     std::size_t dropped_count() const;  // points left out for their non-finite irradiance
 
   private:
-    struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 

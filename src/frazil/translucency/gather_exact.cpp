@@ -1,0 +1,71 @@
+#include <cmath>
+
+#include "frazil/base/parallel.h"
+#include "frazil/translucency/point_tree_data.h"
+
+namespace frazil {
+namespace {
+
+// The mean of a kernel over a disc by Gauss nodes in radius² and equal angles; the plain value where it is small.
+template <class Kernel>
+void average_over_disc(const V3d& offset, const V3f& normal, double radius, bool is_small, const Kernel& kernel) {
+    if (is_small) return kernel(std::sqrt(offset.length2()), 1.0);
+    constexpr int kAngles = 24;
+    constexpr double kNode[8] = {0.019855071751232, 0.101666761293187, 0.237233795041836, 0.408282678752175,
+                                 0.591717321247825, 0.762766204958164, 0.898333238706813, 0.980144928248768};
+    constexpr double kWeight[8] = {0.050614268145188, 0.111190517226687, 0.156853322938944, 0.181341891689181,
+                                   0.181341891689181, 0.156853322938944, 0.111190517226687, 0.050614268145188};
+    const auto [tangent, bitangent] = tangent_frame(normal);
+    for (int i = 0; i < 8; ++i) {
+        const double rho = radius * std::sqrt(kNode[i]);
+        for (int j = 0; j < kAngles; ++j) {
+            const double angle = 2.0 * 3.14159265358979323846 * (j + 0.5 * (i % 2)) / kAngles;
+            const V3d d = offset + V3d(tangent) * (rho * std::cos(angle)) + V3d(bitangent) * (rho * std::sin(angle));
+            kernel(std::sqrt(d.length2()), kWeight[i] / kAngles);
+        }
+    }
+}
+
+}  // namespace
+
+Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estimator estimator) const {
+    const Impl& tree = *impl_;
+    Gathered out;
+    out.groups = tree.groups;
+    out.exitance.assign(count * tree.groups, Rgb(0.0f));
+    out.coverage.assign(count, Rgb(0.0f));
+    double shortest = mean_free_path(tree.profile, 0);
+    for (int c = 1; c < 3; ++c) shortest = std::min(shortest, mean_free_path(tree.profile, c));
+    parallel_for(count, 16, [&](std::size_t begin, std::size_t end) {
+        std::vector<double> sums(3 * tree.groups);
+        for (std::size_t i = begin; i < end; ++i) {
+            std::fill(sums.begin(), sums.end(), 0.0);
+            V3d coverage(0.0);
+            for (std::size_t p = 0; p < tree.positions.size(); ++p) {
+                const V3d offset = V3d(tree.positions[p]) - V3d(positions[i]);
+                const double radius = footprint_radius(tree.areas[p]), r = offset.length();
+                const bool is_small = estimator == Estimator::sum || radius < 1e-4 * std::hypot(r, shortest);
+                average_over_disc(offset, tree.normals[p], radius, is_small, [&](double distance, double weight) {
+                    const Rgb color = eval(tree.ramp, static_cast<float>(distance));
+                    for (int c = 0; c < 3; ++c) {
+                        const double share = reflectance(tree.profile, c, distance) * tree.areas[p] * weight;
+                        coverage[c] += share;
+                        for (std::size_t g = 0; g < tree.groups; ++g) {
+                            sums[3 * g + c] +=
+                                share * tree.irradiance[p * tree.groups + g][c] * color[c] * tree.ramp_scale[c];
+                        }
+                    }
+                });
+            }
+            out.coverage[i] = Rgb(coverage);
+            for (std::size_t g = 0; g < tree.groups; ++g) {
+                for (int c = 0; c < 3; ++c) {
+                    out.exitance[i * tree.groups + g][c] = static_cast<float>(sums[3 * g + c]);
+                }
+            }
+        }
+    });
+    return out;
+}
+
+}  // namespace frazil

@@ -1,0 +1,62 @@
+// The inner loop of a gather: a list of sources against a block of shading points.
+// Model: each source is a patch of surface of known centroid and second moments C; its kernel is the profile averaged
+//   over the patch to second order, f + f' tr C + 2 f'' d.C d, with f' and f'' the derivatives in q = |d|².
+// Units: metres.
+// Valid: sums run over the sources in order, one shading point a lane: the same bits however blocks are spread.
+// Not: which sources are in the list: gather.cpp.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "frazil/translucency/kernel_table.h"
+#include "frazil/translucency/ramp.h"
+
+namespace frazil {
+
+inline constexpr std::size_t kBlockLanes = 64;  // shading points of a block, at most
+
+struct Source {
+    std::array<float, 3> center;
+    std::array<float, 6> covariance;    // xx, yy, zz, xy, xz, yz
+    std::array<float, 3> power_offset;  // from center to the centre of power
+    float area;
+};
+
+// Sources of one block with their power, (sources, 3 groups).
+struct SourceList {
+    std::vector<Source> sources;
+    std::vector<float> powers;
+
+    void clear() {
+        sources.clear();
+        powers.clear();
+    }
+};
+
+// Shading points and their sums. Rows of kBlockLanes floats: coverage (3 rows), exitance (3 groups rows).
+struct BlockSums {
+    alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
+    std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
+    alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
+    std::vector<float> exitance;
+};
+
+// Piecewise-linear ramp as a sum of hinges: colour at 0 plus slope changes times max(0, r - distance).
+struct RampHinges {
+    std::array<float, 3> first{1.0f, 1.0f, 1.0f};
+    struct Hinge {
+        float distance;
+        std::array<float, 3> slope_change;
+    };
+    std::vector<Hinge> hinges;
+    bool is_flat = true;
+};
+RampHinges hinges_of(const Ramp& ramp, const Rgb& scale);
+
+// Add every source's share to the block's sums.
+void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
+                 BlockSums& block);
+
+}  // namespace frazil

@@ -1,0 +1,292 @@
+"""Profiles, ramps, the gather and area compensation against closed forms and sums in double precision."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import integrate
+from surfaces import Points, cone, corner, plane, sphere
+
+import frazil as fz
+
+MEDIUM = fz.Medium(sigma_s_prime=(30.0, 25.0, 40.0), sigma_a=(0.6, 0.15, 0.05), eta=1.31)
+MATCHED = fz.Medium(sigma_s_prime=(30.0, 30.0, 30.0), sigma_a=(0.6, 0.15, 0.05), eta=1.0)
+CLEAR = fz.Medium(sigma_s_prime=(1000.0, 800.0, 600.0), sigma_a=(0.0, 0.0, 0.0), eta=1.31)
+ESTIMATORS = ["noise_free", "sum"]
+
+
+def dipole_numpy(medium: fz.Medium, r: np.ndarray) -> np.ndarray:
+    """The standard dipole in double precision; its boundary's average reflection by scipy's quadrature."""
+    eta = 1.0 / medium.eta
+
+    def reflected(mu):
+        s2 = (1 - mu * mu) / eta**2
+        if s2 >= 1:
+            return 1.0
+        ct = np.sqrt(1 - s2)
+        return 0.5 * (((eta * mu - ct) / (eta * mu + ct)) ** 2 + ((mu - eta * ct) / (mu + eta * ct)) ** 2)
+
+    critical = np.sqrt(max(0.0, 1 - eta**2))
+    fdr = 2 * integrate.quad(lambda m: reflected(m) * m, 0, 1, points=[critical], epsabs=1e-12)[0]
+    boundary = (1 + fdr) / (1 - fdr)
+    ss, sa = np.float64(medium.sigma_s_prime), np.float64(medium.sigma_a)
+    st = ss + sa
+    str_ = np.sqrt(3 * sa * st)
+    out = 0.0
+    for z in (1 / st, (1 + 4 * boundary / 3) / st):
+        d = np.sqrt(np.asarray(r, float)[:, None] ** 2 + z**2)
+        out = out + z * (1 + str_ * d) * np.exp(-str_ * d) / d**3
+    return ss / st / (4 * np.pi) * out
+
+
+def test_dipole_equals_its_formula():
+    r = np.geomspace(1e-4, 2.0, 40)
+    for medium in (MEDIUM, MATCHED):
+        np.testing.assert_allclose(fz.Dipole(medium).reflectance(r), dipole_numpy(medium, np.float32(r)), rtol=2e-5)
+
+
+@pytest.mark.parametrize("medium", [MEDIUM, MATCHED])
+def test_dipole_integrates_to_its_albedo(medium):
+    profile = fz.Dipole(medium)
+    for c in range(3):
+        total = integrate.quad(
+            lambda x, c=c: 2 * np.pi * np.exp(2 * x) * float(profile.reflectance(np.exp(x))[0, c]), -14, 3, limit=400
+        )[0]
+        assert total == pytest.approx(profile.albedo[c], rel=1e-4)
+    np.testing.assert_allclose(profile.within(np.inf)[0], profile.albedo, rtol=1e-6)
+    part = integrate.quad(lambda r: 2 * np.pi * r * float(profile.reflectance(r)[0, 0]), 0, 0.1)[0]
+    assert part == pytest.approx(profile.within(0.1)[0, 0], rel=1e-4)
+
+
+def test_nothing_absorbed_means_albedo_one():
+    np.testing.assert_allclose(fz.Dipole(CLEAR).albedo, 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.31, 1.5])
+def test_albedo_inversion_round_trip(eta):
+    albedo = np.array([0.05, 0.5, 0.9, 0.99, 0.9999, 0.0])
+    for three in albedo.reshape(2, 3):
+        mean_free_path = np.array([0.001, 0.02, 3.0])
+        medium = fz.Medium.from_albedo(three, mean_free_path, eta=eta)
+        np.testing.assert_allclose(fz.Dipole(medium).albedo, three, rtol=1e-4)
+        np.testing.assert_allclose(medium.mean_free_path, mean_free_path, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (dict(sigma_s_prime=(-1, 1, 1), sigma_a=0.1), "Medium: sigma_s_prime must be >= 0 and finite, got -1"),
+        (dict(sigma_s_prime=1, sigma_a=float("nan")), "Medium: sigma_a must be >= 0 and finite, got nan"),
+        (dict(sigma_s_prime=0, sigma_a=0), "must be > 0 in every channel"),
+        (dict(sigma_s_prime=1, sigma_a=0, eta=0.9), r"eta must be in \[1, 4\], got 0.9"),
+        (dict(sigma_s_prime=(1, 2), sigma_a=0), "one number or three"),
+    ],
+)
+def test_bad_media(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fz.Medium(**arguments)
+
+
+def test_bad_albedo():
+    with pytest.raises(ValueError, match=r"albedo must be in \[0, 1\), got 1"):
+        fz.Medium.from_albedo(1.0, 0.01)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("groups", [1, 3])
+def test_gather_equals_the_sum_in_double(estimator, groups):
+    points = sphere(20000, 0.7)
+    rng = np.random.default_rng(1)
+    irradiance = rng.uniform(0, 1, (len(points.areas), groups, 3)) + (points.positions[:, :1, None] > 0)
+    ramp = fz.Ramp([0.0, 0.05, 0.2], [[1, 0, 0], [0.2, 1, 0.5], [1, 1, 3]])
+    where = points.positions[::97] * 1.001
+    tree = fz.PointTree(points, irradiance, fz.Dipole(MEDIUM), ramp)
+    exact = tree.gather_exact(where, estimator)
+    rms = {}
+    for tolerance in (0.01, 0.0001):
+        out = tree.gather(where, tolerance=tolerance, estimator=estimator)
+        assert out.exitance.shape == (len(where), groups, 3)
+        for name in ("exitance", "coverage"):
+            error = getattr(out, name) / getattr(exact, name) - 1
+            rms[name, tolerance] = np.sqrt((error**2).mean())
+    assert rms["exitance", 0.01] < 0.005
+    assert rms["coverage", 0.01] < 0.005
+    assert rms["exitance", 0.0001] < 3e-4
+    assert rms["coverage", 0.0001] < 3e-4
+
+
+def test_sum_equals_numpy():
+    points = sphere(3000, 0.5)
+    irradiance = np.random.default_rng(2).uniform(0, 2, (3000, 3))
+    where = points.positions[:20]
+    tree = fz.PointTree(points, irradiance, fz.Dipole(MEDIUM))
+    r = np.linalg.norm(np.float32(points.positions)[None].astype(float) - np.float32(where)[:, None], axis=2)
+    kernel = dipole_numpy(MEDIUM, r.ravel()).reshape(*r.shape, 3) * points.areas[None, :, None]
+    exact = tree.gather_exact(where, "sum")
+    np.testing.assert_allclose(exact.exitance[:, 0], (kernel * irradiance).sum(1), rtol=1e-5)
+    np.testing.assert_allclose(exact.coverage, kernel.sum(1), rtol=1e-5)
+    out = tree.gather(where, tolerance=1e-6, estimator="sum")
+    np.testing.assert_allclose(out.exitance[:, 0], (kernel * irradiance).sum(1), rtol=3e-4)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_coverage_of_a_sphere(estimator):
+    radius = 0.2
+    profile = fz.Dipole(MEDIUM)
+    tree = fz.PointTree(sphere(40000, radius), np.ones((40000, 3)), profile)
+    where = sphere(500, radius).positions
+    out = tree.gather(where, tolerance=0.001, estimator=estimator)
+    expected = profile.within(2 * radius)[0]
+    np.testing.assert_allclose(out.coverage, np.broadcast_to(expected, out.coverage.shape), rtol=0.01)
+    np.testing.assert_allclose(out.coverage.mean(0), expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("half_angle", [0.1, 0.4, 1.0, 0.5 * np.pi])
+def test_coverage_of_a_cone_apex(estimator, half_angle):
+    profile = fz.Dipole(MATCHED)
+    points = cone(half_angle, 200, 5e-4, 20.0)
+    tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)
+    out = tree.gather([[0.0, 0.0, 0.0]], tolerance=1e-4, estimator=estimator)
+    np.testing.assert_allclose(out.coverage[0] / profile.albedo, np.sin(half_angle), rtol=5e-3)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_coverage_of_a_cube_vertex(estimator):
+    profile = fz.Dipole(MATCHED)
+    points = corner(200, 5e-4, 20.0)
+    tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)
+    out = tree.gather([[0.0, 0.0, 0.0]], tolerance=1e-4, estimator=estimator)
+    np.testing.assert_allclose(out.coverage[0] / profile.albedo, 0.75, rtol=5e-3)
+
+
+@pytest.mark.parametrize("spacing", [0.25, 0.5, 1.0, 2.0])
+def test_noise_free_coverage_of_a_plane(spacing):
+    """Spacing in mean free paths, on a jittered grid."""
+    medium = fz.Medium(100.0, 2.0, eta=1.31)
+    profile = fz.Dipole(medium)
+    mean_free_path = float(medium.mean_free_path[0])
+    points = plane(spacing * mean_free_path, 40 * mean_free_path, seed=3)
+    tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)
+    where = np.zeros((400, 3))
+    where[:, :2] = np.random.default_rng(4).uniform(-3, 3, (400, 2)) * mean_free_path
+    inside = profile.within(40 * mean_free_path)[0]
+    error = {e: tree.gather(where, estimator=e, tolerance=0.003).coverage / inside - 1 for e in ESTIMATORS}
+    rms = {e: np.sqrt((error[e] ** 2).mean()) for e in ESTIMATORS}
+    assert rms["noise_free"] < 0.003 + 0.04 * spacing
+    assert rms["noise_free"] < 0.5 * rms["sum"] + 0.002
+
+
+def test_energy_preserving_ramp():
+    profile = fz.Dipole(MEDIUM)
+    mean_free_path = 1 / 30.6
+    points = plane(0.5 * mean_free_path, 30 * mean_free_path)
+    colors = [[1.0, 0.2, 0.0], [0.1, 1.0, 2.0], [0.5, 0.5, 1.0]]
+    ramp = fz.Ramp([0.0, 3.0, 10.0], colors, preserve_energy=True, mean_free_path=mean_free_path)
+    np.testing.assert_allclose(ramp.eval([0.0, 3 * mean_free_path, 1.0]), colors, rtol=1e-5, atol=1e-6)
+    tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile, ramp)
+    out = tree.gather([[0.0, 0.0, 0.0]], tolerance=1e-4)
+    np.testing.assert_allclose(out.exitance[0, 0], out.coverage[0], rtol=0.02)
+
+
+def test_linear_in_the_knots():
+    points = sphere(2000)
+    irradiance = np.random.default_rng(5).uniform(0, 1, (2000, 3))
+    profile = fz.Dipole(fz.Medium(10.0, 0.1))
+    where = points.positions[:50]
+    knots = [0.05, 0.1, 0.3]
+    total = 0.0
+    for k in range(3):
+        hat = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, np.eye(3)[k][:, None] * np.ones(3)))
+        total = total + (k + 1) * hat.gather(where).exitance
+    colors = (np.arange(3) + 1)[:, None] * np.ones(3)
+    whole = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, colors)).gather(where).exitance
+    np.testing.assert_allclose(total, whole, rtol=1e-4)
+
+
+def test_compensation_modes():
+    profile = fz.Dipole(MEDIUM)
+    total = profile.albedo
+    coverage = np.array([0.0 * total, 0.5 * total, total, 2.0 * total])
+
+    def gain(mode, **options):
+        return fz.area_compensation(coverage, profile, mode=mode, **options)[:, 0]
+
+    np.testing.assert_allclose(gain("ratio"), [8, 2, 1, 1], rtol=1e-5)
+    np.testing.assert_allclose(gain("ratio", limit=1.5), [1.5, 1.5, 1, 1], rtol=1e-5)
+    np.testing.assert_allclose(gain("conserve"), [8, 2, 1, 0.5], rtol=1e-5)
+    np.testing.assert_allclose(gain("linear"), [2, 1.5, 1, 1], rtol=1e-5)
+    np.testing.assert_allclose(gain("off"), 1.0)
+    np.testing.assert_allclose(gain("fill"), np.array([1, 0.5, 0, 0]) * total[0], atol=1e-6)
+    np.testing.assert_allclose(gain("conserve", strength=0.5), [4.5, 1.5, 1, 0.75], rtol=1e-5)
+    same = fz.area_compensation([total * [0.5, 1.0, 1.5]], profile, by_luminance=True)[0]
+    assert same[0] == same[1] == same[2]
+
+
+def test_bad_compensation():
+    profile = fz.Dipole(MEDIUM)
+    with pytest.raises(ValueError, match="mode must be off, ratio"):
+        fz.area_compensation(np.ones((1, 3)), profile, mode="more")
+    with pytest.raises(ValueError, match="limit must be >= 1"):
+        fz.area_compensation(np.ones((1, 3)), profile, limit=0.5)
+    with pytest.raises(ValueError, match=r"strength must be in \[0, 1\]"):
+        fz.area_compensation(np.ones((1, 3)), profile, strength=2)
+
+
+def test_bad_irradiance_and_points():
+    points, profile = sphere(10), fz.Dipole(MEDIUM)
+    with pytest.raises(ValueError, match=r"irradiance must have shape \(N, 3\) or \(N, G, 3\), got \(10, 4\)"):
+        fz.PointTree(points, np.ones((10, 4)), profile)
+    with pytest.raises(ValueError, match="one row per point"):
+        fz.PointTree(points, np.ones((9, 3)), profile)
+    with pytest.raises(ValueError, match="points must not be empty"):
+        fz.PointTree(Points(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)), np.ones((0, 3)), profile)
+    with pytest.raises(ValueError, match="points must be a PointSet"):
+        fz.PointTree(7, np.ones((1, 3)), profile)
+
+
+def test_nan_irradiance_is_left_out_and_counted():
+    points, profile = sphere(1000), fz.Dipole(MEDIUM)
+    irradiance = np.ones((1000, 3))
+    irradiance[5, 1] = np.nan
+    irradiance[6, 2] = np.inf
+    tree = fz.PointTree(points, irradiance, profile)
+    assert (tree.dropped_count, tree.point_count) == (2, 998)
+    assert np.isfinite(tree.gather(points.positions).exitance).all()
+    tree = fz.PointTree(points, irradiance * np.nan, profile)
+    assert (tree.gather(points.positions).exitance == 0).all()
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_hostile_positions(estimator):
+    points, profile = sphere(100), fz.Dipole(MEDIUM)
+    points.positions[:] = points.positions[0]  # coincident
+    tree = fz.PointTree(points, np.ones((100, 3)), profile)
+    out = tree.gather([points.positions[0], [1e6, 0, 0], [1e20, 1e20, 0]], estimator=estimator)
+    assert np.isfinite(out.exitance).all()
+    assert (out.exitance[0] > 0).all()
+    assert (out.exitance[1:] == 0).all()
+    assert (out.coverage[1:] == 0).all()
+    assert tree.gather(np.zeros((0, 3))).exitance.shape == (0, 1, 3)
+    with pytest.raises(ValueError, match="positions must be finite"):
+        tree.gather([[np.nan, 0, 0]])
+    with pytest.raises(ValueError, match="tolerance must be > 0"):
+        tree.gather([[0, 0, 0]], tolerance=0.0)
+    with pytest.raises(ValueError, match="estimator must be"):
+        tree.gather([[0, 0, 0]], estimator="best")
+
+
+@pytest.mark.parametrize(
+    ("distances", "colors", "message"),
+    [
+        ([0.2, 0.1], [[1, 1, 1], [1, 1, 1]], "distances must increase"),
+        ([0.1, 0.1], [[1, 1, 1], [1, 1, 1]], "distances must increase"),
+        ([-1], [[1, 1, 1]], "distances must be >= 0"),
+        ([0.0], [[1, -1, 1]], "colors must be >= 0"),
+        ([0.0, 1.0], [[1, 1, 1]], "one row per distance"),
+        ([], np.zeros((0, 3)), "at least one knot"),
+    ],
+)
+def test_bad_ramps(distances, colors, message):
+    with pytest.raises(ValueError, match=message):
+        fz.Ramp(distances, colors)
