@@ -72,9 +72,10 @@ build: $(STAMPS)/package ## Build and install the package into .venv
 
 # ---- render ---------------------------------------------------------------------------------------------------------
 
-$(OUT)/glacier.usda: examples/glacier.py $(STAMPS)/runtime
+$(OUT)/glacier.usda: $(wildcard examples/*.py) $(STAMPS)/runtime
 	@mkdir -p $(OUT)
 	@python examples/glacier.py -o $@
+	@touch $@
 
 render: $(STAMPS)/package $(OUT)/glacier.usda ## Render the example scene: RESOLUTION=960x540 SAMPLES=32
 	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES)

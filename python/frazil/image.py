@@ -101,9 +101,11 @@ def write_exr(
         for i, channel in enumerate(channel_names(name, letters[name]))
     ]
 
-    spec = oiio.ImageSpec(width, height, len(channels), "float")
+    formats = [channel.format for channel in channels]
+    spec = oiio.ImageSpec(width, height, len(channels), formats[0])
     spec.channelnames = tuple(channel.name for channel in channels)
-    spec.channelformats = tuple(channel.format for channel in channels)
+    if len(set(formats)) > 1:  # OpenImageIO takes no heed of channelformats that are all the same
+        spec.channelformats = tuple(formats)
     spec.attribute("compression", compression)
     for key, value in (metadata or {}).items():
         _set_attribute(oiio, spec, key, value)
@@ -128,7 +130,7 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     Returns
     -------
     layers : dict of str to (H, W, C) float32
-        In the order of the file; R, G, B, A are ``beauty``.
+        R, G, B, A are ``beauty``. The order is that of OpenEXR, by name.
     metadata : dict
         The header's attributes.
 
@@ -206,6 +208,8 @@ def _exceeds_half(array: np.ndarray) -> bool:
 def _set_attribute(oiio: Any, spec: Any, key: str, value: Any) -> None:
     if isinstance(value, bool):
         value = int(value)
+    if isinstance(value, int) and not -(2**31) <= value < 2**31:
+        value = str(value)  # OpenEXR's integers have 32 bits with sign
     if isinstance(value, str | int | float):
         spec.attribute(key, value)
         return
@@ -260,8 +264,8 @@ def _ocio_display(linear: np.ndarray) -> tuple[np.ndarray, str]:
     import OpenImageIO as oiio
 
     config = oiio.ColorConfig(os.environ["OCIO"])
-    if config.has_error:
-        raise OSError(f"OCIO: must name a configuration, got '{os.environ['OCIO']}': {_one_line(config.geterror())}")
+    if problem := _one_line(config.geterror()):
+        raise OSError(f"OCIO: must name a configuration, got '{os.environ['OCIO']}': {problem}.")
     # Our light has Rec.709 primaries; a configuration without such a space takes it as its scene_linear.
     spaces = config.getColorSpaceNames()
     names = ("Linear Rec.709 (sRGB)", "lin_rec709", "Utility - Linear - sRGB", "lin_srgb")

@@ -10,6 +10,7 @@ import resource
 import sys
 import threading
 from collections.abc import Callable
+from datetime import datetime
 from typing import Any
 
 from . import _frazil
@@ -105,18 +106,29 @@ def render(
         "filter": pixel_filter,
     }
     _refuse_what_cannot_fit(*resolution)
-    result = _stoppable(lambda report, should_stop: _frazil.render(scene, options, report, should_stop), progress)
-    stats = dict(result.stats)
-    stats["peak_memory"] = peak_memory()
-    metadata = {"Software": f"Frazil {version()}"}
-    metadata |= {f"frazil:{name}": value for name, value in options.items() if name not in ("width", "height")}
-    metadata["frazil:dropped_samples"] = int(stats.get("dropped_samples", 0))
-    return Film(result.layers, metadata, stats)
+    result = _stoppable(lambda report: _frazil.render(scene, progress=report, **options), progress)
+    stats = {**result.stats, "peak_memory": peak_memory()}
+    return Film(result.layers, _provenance(scene, options, stats), stats)
 
 
 def peak_memory() -> int:
     """The most memory that this process has held so far, bytes."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _provenance(scene: Any, options: dict[str, Any], stats: dict[str, Any]) -> dict[str, Any]:
+    """Where the picture comes from, for its file's header. A scene made in Python has no file and no frame."""
+    frame = getattr(scene, "frame", None)
+    origin = {
+        "Software": f"Frazil {version()}",
+        "DateTime": datetime.now().strftime("%Y:%m:%d %H:%M:%S"),
+        "frazil:scene": getattr(scene, "file", None),
+        "frazil:frame": "default" if frame is None else float(frame),
+        "frazil:camera": scene.camera.path,
+        "frazil:objects": [item.path for item in scene.objects],
+        "frazil:dropped_samples": int(stats.get("dropped_samples", 0)),
+    }
+    return origin | {f"frazil:{name}": value for name, value in options.items() if name not in ("width", "height")}
 
 
 def _refuse_what_cannot_fit(width: int, height: int) -> None:
@@ -138,37 +150,38 @@ def _free_memory() -> int:
         return sys.maxsize
 
 
-def _stoppable(work: Callable[[Progress, Callable[[], bool]], Any], progress: Progress | None) -> Any:
-    """Run ``work(report, should_stop)`` in a thread of its own; an exception here makes should_stop() true.
+def _stoppable(work: Callable[[Progress], Any], progress: Progress | None) -> Any:
+    """Run ``work(report)`` in a thread of its own; after an exception here report() raises, which stops the work.
 
     Signals are heard only by the main thread while it runs Python, so it must not be the one that computes.
     """
-    stop = threading.Event()
+    stop, done = threading.Event(), threading.Event()
     outcome: dict[str, Any] = {}
 
     def report(stage: str, fraction: float) -> None:
-        if progress is None or stop.is_set():
-            return
-        try:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        if progress is not None:
             progress(stage, fraction)
-        except BaseException as error:
-            outcome["error"] = error
-            stop.set()
 
     def run() -> None:
         try:
-            outcome["result"] = work(report, stop.is_set)
+            outcome["result"] = work(report)
         except BaseException as error:
-            outcome.setdefault("error", error)
+            outcome["error"] = error
+        finally:
+            done.set()
 
     worker = threading.Thread(target=run, name="frazil render", daemon=True)
     worker.start()
     try:
-        worker.join()
+        done.wait()  # not join(): interrupted, that takes a running thread for a stopped one
     except BaseException:
         stop.set()
-        worker.join()
+        done.wait()
         raise
+    finally:
+        worker.join()
     if "error" in outcome:
         raise outcome["error"]
     return outcome["result"]

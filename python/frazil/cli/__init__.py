@@ -18,8 +18,8 @@ DONE, FAILED, MISUSED = 0, 1, 2
 _STOPPED_BY = 128  # plus the number of the signal, as shells report it
 
 
-class _Stopped(KeyboardInterrupt):
-    """A signal asked to stop; its number is the argument."""
+class _Stopped(BaseException):
+    """A signal asked to stop; its number is the argument. Not a KeyboardInterrupt, which the parser would swallow."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,10 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             _print_warnings()
             return app()(args=arguments, prog_name="frazil", standalone_mode=False) or DONE
-    except KeyboardInterrupt as stop:
+    except _Stopped as stop:
         _say("error", "stopped. Nothing half-written is left.")
-        number = stop.args[0] if isinstance(stop, _Stopped) else signal.SIGINT
-        return _STOPPED_BY + int(number)
+        return _STOPPED_BY + int(stop.args[0])
     except BrokenPipeError:
         sys.stdout = None  # the reader has left; there is nobody to flush to
         return FAILED
@@ -61,10 +60,8 @@ def _report(error: Exception) -> int:
     if hasattr(error, "format_message"):  # the parser's: an option or argument is wrong
         _say("error", error.format_message())
         return getattr(error, "exit_code", MISUSED)
-    if type(error).__name__ == "Abort":
-        raise KeyboardInterrupt from error
     if isinstance(error, MemoryError):
-        _say("error", "memory is exhausted. Lower --resolution or raise --spacing.")
+        _say("error", str(error) or "memory is exhausted. Lower --resolution or raise --spacing.")
     elif isinstance(error, OSError) and error.filename is not None:
         _say("error", f"{error.filename}: {error.strerror}.")
     elif isinstance(error, KeyError):

@@ -33,7 +33,7 @@ def app() -> Callable[..., Any]:
     from .info import info_command
     from .render import render_command
 
-    commands = typer.Typer(add_completion=False, no_args_is_help=False, rich_markup_mode="markdown")
+    commands = typer.Typer(add_completion=False, no_args_is_help=False, rich_markup_mode="rich")
     commands.callback()(_frazil)
     commands.command("render")(render_command)
     if importlib.util.find_spec("frazil.cli.points") is not None:

@@ -38,8 +38,8 @@ def _describe_usd(file: Path) -> Iterator[str]:
     try:
         stage = Usd.Stage.Open(os.fspath(file))
     except Tf.ErrorException as error:
-        message = str(error).strip().splitlines()[-1]
-        raise OSError(f"{file}: must be a USD stage: {message}") from None
+        reasons = [reason.commentary.strip() for reason in error.args if hasattr(reason, "commentary")]
+        raise OSError(f"{file}: must be a USD stage: {'; '.join(reasons)}.") from None
     prims = list(stage.Traverse(Usd.TraverseInstanceProxies()))
     yield f"{file}: USD stage, {len(prims)} prims"
     yield f"  units      {UsdGeom.GetStageMetersPerUnit(stage):g} m, {UsdGeom.GetStageUpAxis(stage)} up"
@@ -68,7 +68,7 @@ def _kind(prim) -> str:
     from pxr import UsdShade
 
     if prim.IsA(UsdShade.Material):
-        shader = UsdShade.Material(prim).ComputeSurfaceSource(["frazil", "mtlx", ""])[0]
+        shader = UsdShade.Material(prim).ComputeSurfaceSource("frazil")[0]
         return (shader.GetShaderId() or "no id") if shader else "no surface"
     return prim.GetTypeName()
 

@@ -3,7 +3,6 @@
 import json
 import math
 import time
-from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,10 +30,15 @@ def _one_of(option: str, value: str, known: tuple[str, ...]) -> str:
     raise _misused(option, f"must be one of {', '.join(known)}, got '{value}'.{hint}")
 
 
-def _positive(option: str, value: float, may_be_zero: bool = False) -> float:
+def _positive(option: str, value: float, may_be_zero: bool = False) -> None:
     if math.isfinite(value) and (value > 0 or (may_be_zero and value == 0)):
-        return value
+        return
     raise _misused(option, f"must be {'>=' if may_be_zero else '>'} 0 and finite, got {value}.")
+
+
+def _within(option: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise _misused(option, f"must be from {low} to {high}, got {value}.")
 
 
 def render_command(
@@ -52,21 +56,21 @@ def render_command(
         str | None,
         typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),
     ] = None,
-    samples: Annotated[int, typer.Option(min=1, max=2**24, help="Paths per pixel.")] = 32,
+    samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel.")] = 32,
     frame: Annotated[
         float | None, typer.Option(metavar="F", help="Time code to render. Default: the stage's default values.")
     ] = None,
     frames: Annotated[
         str | None, typer.Option(metavar="A-B[xSTEP]", help="Several frames, as in 1-100x2 or 1,5,20-30.")
     ] = None,
-    threads: Annotated[int, typer.Option(min=0, max=4096, help="0 = all cores; the picture is the same.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of all random numbers.")] = 0,
-    max_bounces: Annotated[int, typer.Option(min=0, max=1024, help="Of diffuse and specular paths.")] = 4,
+    threads: Annotated[int, typer.Option(metavar="N", help="0 = all cores; the picture is the same.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of all random numbers.")] = 0,
+    max_bounces: Annotated[int, typer.Option(metavar="N", help="Of diffuse and specular paths.")] = 4,
     spacing: Annotated[
         float, typer.Option(metavar="METRES", help="Between translucency points. 0 = by material.")
     ] = 0.0,
     spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
-    bake_samples: Annotated[int, typer.Option(min=1, max=2**24, help="Shadow rays per point and light.")] = 64,
+    bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[
@@ -104,6 +108,11 @@ def render_command(
     _positive("--tolerance", tolerance)
     _positive("--spacing-scale", spacing_scale)
     _positive("--spacing", spacing, may_be_zero=True)
+    _within("--samples", samples, 1, 2**24)
+    _within("--threads", threads, 0, 4096)
+    _within("--seed", seed, 0, 2**32 - 1)
+    _within("--max-bounces", max_bounces, 0, 1024)
+    _within("--bake-samples", bake_samples, 1, 2**24)
     layers = _chosen_layers(aov)
     jobs = _jobs(output, png, no_png, frame, frames)
     _refuse_unreadable(scene)
@@ -135,7 +144,6 @@ def render_command(
             reporter("load", 1.0)
 
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
-            film.metadata |= _provenance(scene, loaded, time_code)
 
             start = time.perf_counter()
             film.save(exr, compression, layers=layers)
@@ -207,22 +215,11 @@ def _refuse_unwritable(*paths: Path | None) -> None:
 
 def _authored_resolution(loaded: Any) -> tuple[int, int]:
     """The resolution that the stage's render settings ask for, else the default."""
-    resolution = getattr(loaded, "resolution", None)
-    return (int(resolution[0]), int(resolution[1])) if resolution else DEFAULT_RESOLUTION
+    settings = loaded.render_settings
+    return (settings and settings.resolution) or DEFAULT_RESOLUTION
 
 
 # ---- what is told ----------------------------------------------------------------------------------------------------
-
-
-def _provenance(scene: Path, loaded: Any, time_code: float | None) -> dict[str, Any]:
-    """Where a picture comes from, for the EXR's header."""
-    return {
-        "DateTime": datetime.now().strftime("%Y:%m:%d %H:%M:%S"),
-        "frazil:scene": str(scene),
-        "frazil:frame": "default" if time_code is None else float(time_code),
-        "frazil:camera": getattr(loaded, "camera_path", None),
-        "frazil:objects": getattr(loaded, "object_paths", None),
-    }
 
 
 def _record(film: Any, time_code: float | None, exr: Path, seconds_load: float, seconds_save: float) -> dict[str, Any]:
