@@ -42,7 +42,7 @@ class TileSharer {
             append_fragments(mesh_, spacing_, frame, grid.triangles[i], kLongestEdge, fragments_);
         }
         const double reach = kReach * largest_radius;
-        near_.reset(frame.size, largest_radius, reach);
+        near_.reset(frame.size, kCellWidth * largest_radius, reach, least_cosine(thin_walls_));
         for (const Fragment& f : fragments_) {
             const V3f centroid = centroid_of(f);
             near_.mark(centroid, centroid);
@@ -76,10 +76,11 @@ class TileSharer {
         const float reach = (radius + std::sqrt(extent2)) * 1.001f;
         candidates_.clear();
         points_.clear();
-        near_.any_near(centroid, [&](std::uint32_t p) {
-            if ((near_.locals[p] - centroid).length2() > reach * reach) return false;
-            if (!is_same_side(near_.normals[p], f.normal, thin_walls_)) return false;
+        double surely = 1e30;  // some point is nearer than this to all of the fragment
+        near_.any_near(centroid, f.normal, reach * reach, [&](std::uint32_t p) {
             push_candidate(f, p);
+            const double* d = candidates_.back().d;
+            surely = std::min(surely, std::max(d[0], std::max(d[1], d[2])));
             return false;
         });
         if (candidates_.empty()) {
@@ -91,6 +92,17 @@ class TileSharer {
             if (near_.count() > 0) areas.add(indices_[best], area);
             return;
         }
+
+        // Leave out who is farther from all of the fragment than another point is from any of it.
+        const double farthest = std::sqrt(surely) * 1.0001 + std::sqrt(double(extent2));
+        std::size_t left = 0;
+        for (std::size_t i = 0; i < candidates_.size(); ++i) {
+            if ((near_.locals[points_[i]] - centroid).length2() > farthest * farthest) continue;
+            candidates_[left] = candidates_[i];
+            points_[left++] = points_[i];
+        }
+        candidates_.resize(left);
+        points_.resize(left);
 
         const int count = static_cast<int>(candidates_.size());
         int nearest[3];
@@ -109,11 +121,14 @@ class TileSharer {
         shares_.clear();
         double total = 0.0;
         Piece piece;
-        for (const int self : kept_) {
-            clip_piece(candidates_.data(), kept_, self, piece);
+        for (std::size_t i = 0; i + 1 < kept_.size(); ++i) {
+            clip_piece(candidates_.data(), kept_, kept_[i], piece);
             shares_.push_back(piece_share(piece));
             total += shares_.back();
         }
+        // The last one has the rest.
+        shares_.push_back(std::max(0.0, 1.0 - total));
+        total += shares_.back();
         for (std::size_t i = 0; i < kept_.size(); ++i) {
             if (shares_[i] > 0.0) areas.add(indices_[points_[kept_[i]]], area * shares_[i] / total);
         }

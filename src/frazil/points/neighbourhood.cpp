@@ -2,13 +2,14 @@
 
 namespace frazil {
 
-void Neighbourhood::reset(double size, double cell, double reach) {
+void Neighbourhood::reset(double size, double cell, double reach, float least_cosine) {
     constexpr double kMostCells = 24.0;
     cells_ = static_cast<std::size_t>(std::clamp(std::ceil(size / cell), 1.0, kMostCells));
     last_cell_ = static_cast<float>(cells_ - 1);
     width_ = static_cast<float>(size / cells_);
     scale_ = 1.0f / width_;
     reach_ = static_cast<float>(reach);
+    least_cosine_ = least_cosine;
     marked_.assign(cells_ * cells_ * cells_, 0);
     heads_.assign(cells_ * cells_ * cells_, -1);
     chunks_.clear();
@@ -33,6 +34,12 @@ void Neighbourhood::mark(const V3f& low, const V3f& high) {
 }
 
 std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f& world) {
+    // Lanes without a point lie too far away for any look-up.
+    static const Chunk empty = [] {
+        Chunk chunk = {};
+        std::fill(chunk.x, chunk.x + kLanes, 1e30f);
+        return chunk;
+    }();
     const auto index = static_cast<std::uint32_t>(locals.size());
     locals.push_back(local);
     normals.push_back(normal);
@@ -58,12 +65,20 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
                 if (!marked_[cell]) continue;
                 const float dx = gap(x, 0);
                 if (dx * dx + dy * dy + dz * dz > reach2) continue;
-                if (heads_[cell] < 0 || chunks_[heads_[cell]].count == 14) {
-                    chunks_.push_back({heads_[cell], 0, {}});
+                if (heads_[cell] < 0 || chunks_[heads_[cell]].count == int(kLanes)) {
+                    chunks_.push_back(empty);
+                    chunks_.back().next = heads_[cell];
                     heads_[cell] = static_cast<std::int32_t>(chunks_.size()) - 1;
                 }
                 Chunk& list = chunks_[heads_[cell]];
-                list.points[list.count++] = index;
+                const int lane = list.count++;
+                list.x[lane] = local.x;
+                list.y[lane] = local.y;
+                list.z[lane] = local.z;
+                list.nx[lane] = normal.x;
+                list.ny[lane] = normal.y;
+                list.nz[lane] = normal.z;
+                list.points[lane] = index;
             }
         }
     }

@@ -26,7 +26,8 @@ struct Dart {
 };
 
 // The longest edge of a fragment beside the spacing, and how far from a fragment's centroid the points can lie that matter.
-inline constexpr double kLongestEdge = 1.0;
+inline constexpr double kLongestEdge = 1.5;
+inline constexpr double kCellWidth = 1.6;  // of the cells of points, in spacings
 inline constexpr double kReach = 1.0 + kCentroidReach * kLongestEdge + 0.01;
 
 class TileFiller {
