@@ -1,5 +1,8 @@
 """Frazil: renderer and look-development toolkit for glacier ice and other translucent matter."""
 
+import importlib
+from typing import Any
+
 from ._frazil import (
     Camera,
     ControlMesh,
@@ -14,6 +17,7 @@ from ._frazil import (
     Medium,
     Mesh,
     Object,
+    PointSet,
     PointTree,
     Ramp,
     RectLight,
@@ -25,11 +29,21 @@ from ._frazil import (
     area_compensation,
     fresnel_average,
     fresnel_dielectric,
+    poisson_points,
     subdivide,
+    tessellated_points,
     triangulate,
 )
-from .usd import UsdScene, load_usd, read_meshes
 from .warning import FrazilWarning
+
+# Names that need more than the core, and where they live: imported when first asked for.
+_LAZY = {
+    "Film": ".film",
+    "UsdScene": ".usd",
+    "load_usd": ".usd",
+    "read_meshes": ".usd",
+    "render": ".rendering",
+}
 
 __all__ = [
     "Camera",
@@ -39,6 +53,7 @@ __all__ = [
     "DiskLight",
     "DistantLight",
     "DomeLight",
+    "Film",
     "FrazilWarning",
     "IceMaterial",
     "Light",
@@ -46,6 +61,7 @@ __all__ = [
     "Medium",
     "Mesh",
     "Object",
+    "PointSet",
     "PointTree",
     "Ramp",
     "RectLight",
@@ -59,7 +75,22 @@ __all__ = [
     "fresnel_average",
     "fresnel_dielectric",
     "load_usd",
+    "poisson_points",
     "read_meshes",
+    "render",
     "subdivide",
+    "tessellated_points",
     "triangulate",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'frazil' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

@@ -6,9 +6,11 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/geometry/mesh.h"
 
 namespace frazil {
 
@@ -18,9 +20,13 @@ struct PointSet {
     std::vector<float> areas;
     std::vector<std::int32_t> triangles;
     std::vector<V2f> barycentrics;  // of the triangle's second and third corner
-    float spacing = 0.0f;
+    double spacing = 0.0;           // the largest, where it varies
 
     std::size_t size() const { return positions.size(); }
 };
+
+// The same points on another pose of the mesh: positions, normals and areas follow their triangles, ids stay. An area
+// changes as its triangle's does. ValueError where the meshes do not have the same triangles.
+PointSet points_on(const PointSet& points, const Mesh& rest, const Mesh& pose);
 
 }  // namespace frazil

@@ -21,7 +21,7 @@ struct Body {
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     std::unique_ptr<const PointTree> tree;  // none where the object has no surface
-    Rgb total_reflectance;                  // Rd_total
+    Rgb total_reflectance = Rgb(0.0f);      // Rd_total
 };
 
 // The spacing of an object's points: the render's, else the material's, else the shortest mean free path of a channel,
