@@ -94,9 +94,7 @@ def _reorder_corners(primvar: Primvar | None, order: np.ndarray) -> Primvar | No
     return np.ascontiguousarray(primvar[0][order]), primvar[1]
 
 
-def _subdivision_steps(
-    context: ReadContext, schema: UsdGeom.Mesh, counts: np.ndarray, has_normals: bool
-) -> int | None:
+def _subdivision_steps(context: ReadContext, schema: UsdGeom.Mesh, counts: np.ndarray, has_normals: bool) -> int | None:
     """How often each edge is halved (0 = the cage itself, on the limit surface); None = flat polygons."""
     attribute = schema.GetSubdivisionSchemeAttr()
     scheme = attribute.Get()
