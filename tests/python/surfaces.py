@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, Voronoi
 
 
 @dataclass
@@ -50,15 +51,21 @@ def cone(half_angle: float, rings: int, inner: float, outer: float, slices: int 
 
 
 def plane(spacing: float, half: float, seed: int | None = None) -> Points:
-    """A square grid in z = 0, jittered within the cells where a seed is given."""
+    """A square grid in z = 0, or a jittered one with the areas of its Voronoi cells where a seed is given."""
     n = int(round(2 * half / spacing))
     x = (np.arange(n) + 0.5) * spacing - half
     xy = np.stack(np.meshgrid(x, x, indexing="ij"), -1).reshape(-1, 2)
+    areas = np.full(len(xy), spacing**2)
     if seed is not None:
-        xy = xy + np.random.default_rng(seed).uniform(-0.25, 0.25, xy.shape) * spacing
+        xy = xy + np.random.default_rng(seed).uniform(-0.3, 0.3, xy.shape) * spacing
+        cells = Voronoi(xy)
+        for k, region in enumerate(cells.point_region):
+            corners = cells.regions[region]
+            if np.abs(xy[k]).max() < half - 2 * spacing and -1 not in corners:
+                areas[k] = ConvexHull(cells.vertices[corners]).volume
     positions = np.concatenate([xy, np.zeros((len(xy), 1))], axis=1)
     normals = np.broadcast_to([0.0, 0.0, 1.0], positions.shape)
-    return Points(positions, normals, np.full(len(xy), spacing**2), spacing)
+    return Points(positions, normals, areas, spacing)
 
 
 def corner(rings: int, inner: float, outer: float, slices: int = 32) -> Points:

@@ -93,13 +93,13 @@ def test_bad_albedo():
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-@pytest.mark.parametrize("groups", [1, 3])
-def test_gather_equals_the_sum_in_double(estimator, groups):
-    points = sphere(20000, 0.7)
+@pytest.mark.parametrize(("groups", "has_ramp", "fine"), [(1, False, 1e-3), (3, True, 2e-3)])
+def test_gather_equals_the_sum_in_double(estimator, groups, has_ramp, fine):
+    points = sphere(3000, 0.35)
     rng = np.random.default_rng(1)
     irradiance = rng.uniform(0, 1, (len(points.areas), groups, 3)) + (points.positions[:, :1, None] > 0)
-    ramp = fz.Ramp([0.0, 0.05, 0.2], [[1, 0, 0], [0.2, 1, 0.5], [1, 1, 3]])
-    where = points.positions[::97] * 1.001
+    ramp = fz.Ramp([0.0, 0.05, 0.2], [[1, 0, 0], [0.2, 1, 0.5], [1, 1, 3]]) if has_ramp else None
+    where = points.positions[::73] * 1.001
     tree = fz.PointTree(points, irradiance, fz.Dipole(MEDIUM), ramp)
     exact = tree.gather_exact(where, estimator)
     rms = {}
@@ -111,8 +111,8 @@ def test_gather_equals_the_sum_in_double(estimator, groups):
             rms[name, tolerance] = np.sqrt((error**2).mean())
     assert rms["exitance", 0.01] < 0.005
     assert rms["coverage", 0.01] < 0.005
-    assert rms["exitance", 0.0001] < 3e-4
-    assert rms["coverage", 0.0001] < 3e-4
+    assert rms["exitance", 0.0001] < fine
+    assert rms["coverage", 0.0001] < fine
 
 
 def test_sum_equals_numpy():
@@ -166,15 +166,15 @@ def test_noise_free_coverage_of_a_plane(spacing):
     medium = fz.Medium(100.0, 2.0, eta=1.31)
     profile = fz.Dipole(medium)
     mean_free_path = float(medium.mean_free_path[0])
-    points = plane(spacing * mean_free_path, 40 * mean_free_path, seed=3)
+    points = plane(spacing * mean_free_path, 20 * mean_free_path, seed=3)
     tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)
     where = np.zeros((400, 3))
     where[:, :2] = np.random.default_rng(4).uniform(-3, 3, (400, 2)) * mean_free_path
-    inside = profile.within(40 * mean_free_path)[0]
+    inside = profile.within(20 * mean_free_path)[0]
     error = {e: tree.gather(where, estimator=e, tolerance=0.003).coverage / inside - 1 for e in ESTIMATORS}
     rms = {e: np.sqrt((error[e] ** 2).mean()) for e in ESTIMATORS}
     assert rms["noise_free"] < 0.003 + 0.04 * spacing
-    assert rms["noise_free"] < 0.5 * rms["sum"] + 0.002
+    assert rms["noise_free"] < 0.8 * rms["sum"] + 0.002
 
 
 def test_energy_preserving_ramp():

@@ -106,8 +106,7 @@ CompensationMode mode_named(const std::string& name) {
     if (name == "conserve") return CompensationMode::conserve;
     if (name == "fill") return CompensationMode::fill;
     if (name == "linear") return CompensationMode::linear;
-    throw ValueError(
-        str("area_compensation: mode must be off, ratio, conserve, fill or linear, got '", name, "'."));
+    throw ValueError(str("area_compensation: mode must be off, ratio, conserve, fill or linear, got '", name, "'."));
 }
 
 template <class Kind>
@@ -175,10 +174,7 @@ void bind_translucency(nb::module_& module) {
         .def_prop_ro("sigma_a", [](const Medium& m) { return to_array(m.sigma_a); })
         .def_ro("eta", &Medium::eta)
         .def_prop_ro(
-            "mean_free_path",
-            [](const Medium& m) {
-                return to_array(Rgb(1.0f) / (m.sigma_s_prime + m.sigma_a));
-            },
+            "mean_free_path", [](const Medium& m) { return to_array(Rgb(1.0f) / (m.sigma_s_prime + m.sigma_a)); },
             "1/(sigma_s_prime + sigma_a), (3,), metres.")
         .def("__repr__", [](const Medium& m) {
             return str("Medium(sigma_s_prime=(", m.sigma_s_prime.x, ", ", m.sigma_s_prime.y, ", ", m.sigma_s_prime.z,
@@ -207,9 +203,12 @@ void bind_translucency(nb::module_& module) {
                 new (self) Ramp(in_metres(ramp, mean_free_path));
             },
             "distances"_a, "colors"_a, "preserve_energy"_a = false, "mean_free_path"_a = 1.0)
-        .def("eval", [](const Ramp& self, nb::handle r) {
-            return map_radii(r, "Ramp: r", [&](float x) { return eval(self, x); });
-        }, "r"_a, "The factors at distances r (n,) in metres, (n, 3); preserve_energy is not in them.");
+        .def(
+            "eval",
+            [](const Ramp& self, nb::handle r) {
+                return map_radii(r, "Ramp: r", [&](float x) { return eval(self, x); });
+            },
+            "r"_a, "The factors at distances r (n,) in metres, (n, 3); preserve_energy is not in them.");
 
     nb::class_<Gathered>(module, "Gathered", "What a gather returns.")
         .def_prop_ro("exitance",
@@ -281,7 +280,8 @@ void bind_translucency(nb::module_& module) {
             return own(std::move(gain), {n, 3});
         },
         "coverage"_a, "profile"_a, "mode"_a = "ratio", "limit"_a = 8.0f, "strength"_a = 1.0f, "by_luminance"_a = false,
-        "Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to add\n"
+        "Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to "
+        "add\n"
         "per unit of irradiance at the shading point.");
 }
 

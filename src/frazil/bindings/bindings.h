@@ -33,7 +33,13 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
     return nb::ndarray<nb::numpy, T>(data, shape, owner);
 }
 
+// A (4, 4) float64 matrix for row vectors, as USD's GfMatrix4d and Imath have it.
+using MatrixArray = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
+M44f to_matrix(const MatrixArray& array);
+nb::object from_matrix(const M44f& matrix);
+
 void bind_geometry(nb::module_& module);
+void bind_material(nb::module_& module);
 void bind_points(nb::module_& module);
 void bind_translucency(nb::module_& module);
 void bind_lighting(nb::module_& module);

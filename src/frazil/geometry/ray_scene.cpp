@@ -1,36 +1,17 @@
 #include "frazil/geometry/ray_scene.h"
 
-#if FRAZIL_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <bit>
 #include <cstring>
 
 #include "frazil/base/error.h"
+#include "frazil/geometry/embree.h"
 
 namespace frazil {
 namespace {
 
-// The device is shared: Embree keeps its own threads in TBB, so a second one would gain nothing.
-RTCDevice device() {
-    static const RTCDevice shared = rtcNewDevice(nullptr);
-    if (!shared) throw std::runtime_error("Embree: no device could be made on this processor.");
-    return shared;
-}
-
-void throw_if_embree_failed(const char* step) {
-    const RTCError code = rtcGetDeviceError(device());
-    if (code == RTC_ERROR_NONE) return;
-    if (code == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
-    throw std::runtime_error(str("Embree: ", step, " failed with error ", int(code), "."));
-}
-
 // A triangle geometry with its own copy of the vertices, moved by `local_to_world`.
 RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
-    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                  sizeof(V3f), mesh.positions.size()));
     auto* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(V3i),
@@ -46,7 +27,7 @@ RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
 }
 
 RTCScene make_scene() {
-    RTCScene scene = rtcNewScene(device());
+    RTCScene scene = rtcNewScene(embree_device());
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     return scene;
 }
@@ -117,7 +98,7 @@ RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>
             impl_->attach(make_geometry(mesh, placement.local_to_world), i);
             continue;
         }
-        RTCGeometry instance = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+        RTCGeometry instance = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_INSTANCE);
         rtcSetGeometryInstancedScene(instance, prototype);
         // Row vectors: the matrix in memory is column-major for Embree.
         rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &placement.local_to_world[0][0]);

@@ -2,8 +2,7 @@
 // Model: piecewise-constant density per pixel, proportional to the mean luminance of the bilinear lookup over it and to
 //   the solid angle that it covers [PBRT4, Section 12.5]; no direction that gives light has density 0; pdf() is exact
 //   for sample().
-// Units: radiance; directions in the light's own frame: row 0 is +y, the centre of the image +z, and +x lies left of
-// the
+// Units: radiance; directions in the light's own frame: row 0 is +y, the centre of the image +z, and +x lies left of the
 //   centre (OpenEXR's latitude-longitude map, which UsdLuxDomeLight follows).
 // Valid: any image of finite pixels, at least 1 x 1; negative ones subtract; a black one samples uniformly.
 #pragma once

@@ -1,12 +1,10 @@
 // Irradiance at points: the light that enters a translucent body, baked once per shot.
-// Model: E = ∫ L(w) T(cos) cos dw over the outer hemisphere, per light group, with ray-traced shadows and the
-//   boundary's transmittance T; every light is served by its own stratified samples, quasi-Monte Carlo per point. Domes
-//   with an image share theirs between the image's density and the cosine by the balance heuristic.
+// Model: E = ∫ L(w) T(cos) cos dw over the outer hemisphere, per light group, with ray-traced shadows and the boundary's
+//   transmittance T; every light is served by its own stratified samples, quasi-Monte Carlo per point. Domes with an image
+//   share theirs between the image's density and the cosine by the balance heuristic.
 // Units: W/m² (the lights' unit).
-// Valid: the same bits for any number of threads; seeded by (seed, point), so that a light's part does not depend on
-//   the other lights and a negative twin cancels to the bit. Lights whose translucency multiplier
-// is
-//   0 cost nothing.
+// Valid: the same bits for any number of threads; seeded by (seed, point), so that a light's part does not depend on the
+//   other lights and a negative twin cancels to the bit. Lights whose translucency multiplier is 0 cost nothing.
 // Not: bounces between surfaces (bounce.h).
 #pragma once
 

@@ -1,7 +1,7 @@
 // Lights as UsdLux defines them, with Frazil's multipliers per component.
 // Model: UsdLuxLightAPI. `radiance` is the product of intensity, 2^exposure, color and colour temperature; with
-//   `normalize` it is divided by the light's size: its area in world space, for a distant light pi sin² of its half
-//   angle, 1 for a dome and for parallel light.
+//   `normalize` it is divided by the light's size: its area in world space, for a distant light pi sin² of its half angle,
+//   1 for a dome and for parallel light.
 // Units: radiance (W/m²/sr) for dome and area lights; a distant light's `radiance` times pi sin²(half angle) is the
 //   irradiance it gives, or `radiance` itself where its angle is 0.
 // Valid: finite values; negative radiance subtracts. Rect, disk and distant shine along -z of their frame, sphere and

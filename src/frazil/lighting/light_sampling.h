@@ -1,7 +1,6 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
 // Model: one light picked per sample in proportion to the irradiance that it can give at the point, then a direction on
-// it
-//   (world_light.h).
+//   it (world_light.h).
 // Units: pdf per steradian, the pick included.
 // Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose diffuse and
 //   specular multipliers are both 0 is never picked by sample().

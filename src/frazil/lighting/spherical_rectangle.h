@@ -1,8 +1,7 @@
 // A rectangle as a point sees it: its solid angle, and directions uniform in it.
 // Model: [Urena2013], in double precision, so that small and distant rectangles keep their solid angle.
 // Units: steradian; coordinates in any one unit of length.
-// Valid: the rectangle [x0,x1] × [y0,y1] in the plane z = -height, seen from the origin, height > 0. Below a solid
-// angle
+// Valid: the rectangle [x0,x1] × [y0,y1] in the plane z = -height, seen from the origin, height > 0. Below a solid angle
 //   of 1e-9 the rectangle is taken as flat on the sphere (sampled by area).
 #pragma once
 

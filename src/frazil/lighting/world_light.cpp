@@ -97,18 +97,22 @@ class WorldLight::Builder {
     Shape operator()(const SphereLight& sphere) const {
         const V3f x = row(m_, 0) * sphere.radius, y = row(m_, 1) * sphere.radius, z = row(m_, 2) * sphere.radius;
         set_extent(std::max(x.length(), std::max(y.length(), z.length())) * 1.7321f, 0.25f, V3f(0.0f));
-        const M44f to_world = from_rows(x, y, z);
-        const double det = std::abs(V3d(x).cross(V3d(y)).dot(V3d(z)));
-        return Sphere{m_.translation(), to_world, to_world.inverse(), static_cast<float>(std::cbrt(det))};
+        return make_map<Sphere>(x, y, z);
     }
     Shape operator()(const CylinderLight& cylinder) const {
         const V3f axis = row(m_, 0) * cylinder.length;
         const V3f y = row(m_, 1) * cylinder.radius, z = row(m_, 2) * cylinder.radius;
         set_extent(0.5f * axis.length() + y.length() + z.length(), 1.0f / kPi, V3f(0.0f));
-        return Cylinder{m_.translation(), axis, y, z, from_rows(axis, y, z).inverse()};
+        return make_map<Cylinder>(axis, y, z);
     }
 
   private:
+    template <class Shape>
+    Shape make_map(const V3f& x, const V3f& y, const V3f& z) const {
+        const M44f to_world = from_rows(x, y, z);
+        const double det = std::abs(V3d(x).cross(V3d(y)).dot(V3d(z)));
+        return {m_.translation(), to_world, to_world.inverse(), static_cast<float>(std::cbrt(det))};
+    }
     // Unit normal of the xy plane on the side of the light's own -z.
     V3f shining_side() const {
         const V3f normal = row(m_, 0).cross(row(m_, 1)).normalized();
@@ -345,9 +349,9 @@ bool WorldLight::hit_by(const Sphere& sphere, const V3f& origin, const V3f& dire
 
 namespace {
 
-// Half the angle of the mantle of a unit cylinder that a point at `distance` > 1 from its axis sees.
-float visible_arc(float distance) {
-    return std::acos(1.0f / distance);
+// Half the angle under which a point at `distance` > 1 from its axis sees a unit cylinder.
+float half_width(float distance) {
+    return std::asin(1.0f / distance);
 }
 
 }  // namespace
@@ -358,21 +362,25 @@ void WorldLight::sample_from(const Cylinder& cylinder, const V3f& position, std:
     cylinder.world_to_local.multDirMatrix(position - cylinder.center, at);
     const float axis_distance = std::sqrt(at.y * at.y + at.z * at.z);
     if (!(axis_distance > 1.0f)) return;
-    const float arc = visible_arc(axis_distance);
-    const float middle = std::atan2(at.z, at.y);
+    const float half = half_width(axis_distance);
+    const V2f inward(-at.y / axis_distance, -at.z / axis_distance);
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        const float phi = middle + (2.0f * u[i].x - 1.0f) * arc, c = std::cos(phi), s = std::sin(phi);
-        const V3f point = cylinder.center + cylinder.axis * (u[i].y - 0.5f) + cylinder.y * c + cylinder.z * s;
-        const V3f to_light = point - position;
-        // dA = |axis x tangent| du dphi, and its projection towards the position.
-        const float projected = std::abs(cylinder.axis.cross(cylinder.z * c - cylinder.y * s).dot(to_light));
+        // Across: an angle seen from the point, and the near side of the circle there. Along: uniform in length.
+        const float psi = (2.0f * u[i].x - 1.0f) * half, c = std::cos(psi), s = std::sin(psi);
+        const float offset = axis_distance * s;
+        const float across = (axis_distance * axis_distance - 1.0f) /
+                             (axis_distance * c + std::sqrt(std::max(0.0f, 1.0f - offset * offset)));
+        const V3f local(u[i].y - 0.5f - at.x, across * (c * inward.x - s * inward.y),
+                        across * (s * inward.x + c * inward.y));
+        V3f to_light;
+        cylinder.local_to_world.multDirMatrix(local, to_light);
         const float distance = to_light.length();
-        if (!(projected > 0.0f)) continue;
         sample.direction = to_light / distance;
         sample.distance = distance * kShadowEnd;
         sample.radiance = radiance_;
-        sample.pdf = cube(distance) / (2.0f * arc * projected);
+        // In the local frame dw = across²/r³ dx dpsi; the map to the world turns r³ into distance³/|det|.
+        sample.pdf = cube(distance / cylinder.scale) / (across * across * 2.0f * half);
     }
 }
 
@@ -383,12 +391,9 @@ bool WorldLight::hit_by(const Cylinder& cylinder, const V3f& origin, const V3f& 
     float t;
     if (!enter_unit_ball(V3f(0.0f, at.y, at.z), V3f(0.0f, along.y, along.z), t)) return false;
     if (!(std::abs(at.x + t * along.x) <= 0.5f)) return false;
-    const float c = at.y + t * along.y, s = at.z + t * along.z;
-    const V3f to_light = direction * t;
-    const float projected = std::abs(cylinder.axis.cross(cylinder.z * c - cylinder.y * s).dot(to_light));
-    if (!(projected > 0.0f)) return false;
-    const float arc = visible_arc(std::sqrt(at.y * at.y + at.z * at.z));
-    hit = {radiance_, cube(t) / (2.0f * arc * projected), t, hit.light};
+    const float across2 = t * t * (along.y * along.y + along.z * along.z);
+    const float half = half_width(std::sqrt(at.y * at.y + at.z * at.z));
+    hit = {radiance_, cube(t / cylinder.scale) / (across2 * 2.0f * half), t, hit.light};
     return true;
 }
 

@@ -1,8 +1,7 @@
 // One light in world space: directions towards it with their densities, and what a ray sees of it.
-// Model: rect by its solid angle [Urena2013], sphere by its cone of directions [PBRT4, Section 12.2], disk and cylinder
-// by
-//   area (of a cylinder the visible half), distant uniform in its cone, dome by its image. Sheared or unevenly scaled
-//   shapes are sampled in the frame where they are not, and the density follows the map.
+// Model: rect by its solid angle [Urena2013], sphere by its cone of directions [PBRT4, Section 12.2], disk by area,
+//   cylinder by the angle across and its length, distant uniform in its cone, dome by its image. Sheared or unevenly
+//   scaled shapes are sampled in the frame where they are not, and the density follows the map.
 // Units: pdf per steradian.
 // Valid: any light that check_light accepts; the density of intersect() is that of sample().
 // Not: the choice among lights (light_sampling.h).
@@ -83,8 +82,8 @@ class WorldLight {
     };
     struct Cylinder {
         V3f center;
-        V3f axis, y, z;       // whole axis, two semi-axes
-        M44f world_to_local;  // to the cylinder of length 1 and radius 1 along x, translation left out
+        M44f local_to_world, world_to_local;  // to and from length 1 and radius 1 along x, translation left out
+        float scale;
     };
     // What importance() needs of a light with a surface.
     struct Extent {

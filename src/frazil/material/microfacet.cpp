@@ -133,13 +133,13 @@ float AlbedoTable::average(float alpha) const {
 }
 
 const GgxAlbedo& ggx_albedo() {
-    static const GgxAlbedo tables{
-        AlbedoTable([](float cos_theta, float alpha) {
-            return single_scattering_albedo(cos_theta, alpha, [](float) { return 1.0f; });
-        }),
-        AlbedoTable([](float cos_theta, float alpha) {
-            return single_scattering_albedo(cos_theta, alpha, [](float c) { return schlick_weight(c); });
-        })};
+    static const GgxAlbedo tables{AlbedoTable([](float cos_theta, float alpha) {
+                                      return single_scattering_albedo(cos_theta, alpha, [](float) { return 1.0f; });
+                                  }),
+                                  AlbedoTable([](float cos_theta, float alpha) {
+                                      return single_scattering_albedo(cos_theta, alpha,
+                                                                      [](float c) { return schlick_weight(c); });
+                                  })};
     return tables;
 }
 

@@ -62,7 +62,7 @@ Rgb multiple_scattering_scale(const Rgb& fresnel_average, float alpha);
 
 // Directional albedo of the dielectric GGX reflection with exact Fresnel and energy compensation, tabulated over
 // (cos, alpha) for one eta; average() is its cosine-weighted mean. What is not reflected enters: transmittance = 1 -
-// albedo. It is the integral of dielectric_reflection over wi within 2e-3 (test: microfacet albedo).
+// albedo. It is the integral of dielectric_reflection over wi within 3e-3 (test: microfacet albedo).
 class DielectricAlbedo {
   public:
     // eta of the inside relative to the outside, in [1, 4]: ValueError otherwise.

@@ -55,7 +55,8 @@ Footprint footprint(const Texture& texture, const V2f& st) {
         const bool is_black = i < 0 || j < 0;
         result.weight[corner] = is_black ? 0.0f : weight;
         result.offset[corner] =
-            is_black ? 0 : (std::size_t(j) * std::size_t(texture.width) + std::size_t(i)) * std::size_t(texture.channels);
+            is_black ? 0
+                     : (std::size_t(j) * std::size_t(texture.width) + std::size_t(i)) * std::size_t(texture.channels);
     }
     return result;
 }
@@ -121,8 +122,8 @@ float eval_float(const MaterialInput<float>& input, const V2f& st) {
 V3f eval_normal(const TextureLookup& lookup, const V2f& st) {
     if (!lookup.texture) return V3f(0.0f, 0.0f, 1.0f);
     const MaterialInput<Rgb> input{Rgb(0.0f), lookup};
-    const V3f normal = eval_color(input, st).normalized();
-    return normal.length2() > 0.0f ? normal : V3f(0.0f, 0.0f, 1.0f);
+    const V3f normal = eval_color(input, st);
+    return normal.length2() > 1e-8f ? normal.normalized() : V3f(0.0f, 0.0f, 1.0f);
 }
 
 }  // namespace frazil

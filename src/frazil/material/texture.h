@@ -1,5 +1,5 @@
 // Images on surfaces: bilinear lookup. Files are read in Python; the core sees arrays.
-// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image. A missing alpha reads 1.
+// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image. A missing alpha is 1.
 // Units: values after `scale` and `bias`, linear.
 // Valid: 1 to 4 channels; any size; a non-finite st reads as (0,0).
 // Not: UDIM, mip-maps, anisotropic filtering.
@@ -25,7 +25,7 @@ struct Texture {
 // value = texel * scale + bias.
 struct TextureLookup {
     std::shared_ptr<const Texture> texture;
-    int first_channel = 0;  // 0..3; a scalar input reads this one, a colour reads three from it
+    int first_channel = 0;                    // 0..3; a scalar input reads this one, a colour reads three from it
     V3f scale = V3f(1.0f), bias = V3f(0.0f);  // by channel; a scalar input takes those of its channel, alpha takes z
     // st' = rotate(st * st_scale, st_rotation degrees) + st_translation
     V2f st_scale = V2f(1.0f), st_translation = V2f(0.0f);

@@ -29,8 +29,8 @@ void halve(const Corner& a, const Corner& b, const Corner& c, double longest_edg
                              triangle});
         return;
     }
-    if (bc == longest) return halve(b, c, a, longest_edge, normal, triangle, fragments);
-    if (ca == longest) return halve(c, a, b, longest_edge, normal, triangle, fragments);
+    if (ab < longest && bc == longest) return halve(b, c, a, longest_edge, normal, triangle, fragments);
+    if (ab < longest) return halve(c, a, b, longest_edge, normal, triangle, fragments);
     const Corner middle = mix(a, b, 0.5);
     halve(a, middle, c, longest_edge, normal, triangle, fragments);
     halve(middle, b, c, longest_edge, normal, triangle, fragments);

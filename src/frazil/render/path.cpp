@@ -62,7 +62,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         Hit hit;
         ++tile.rays;
         const bool is_hit = ray_scene_.intersect(path.ray, hit);
-        add_lights_on_ray(path, is_hit ? hit.t : path.ray.t_max, tile);
+        add_lights_on_ray(path, is_hit ? hit.t : std::numeric_limits<float>::infinity(), tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;

@@ -54,8 +54,7 @@ double Dipole::within(int c, double radius) const {
 }
 
 double Dipole::albedo(int c) const {
-    return 0.5 * alpha_prime[c] *
-           (std::exp(-double(sigma_tr[c]) * z_r[c]) + std::exp(-double(sigma_tr[c]) * z_v[c]));
+    return 0.5 * alpha_prime[c] * (std::exp(-double(sigma_tr[c]) * z_r[c]) + std::exp(-double(sigma_tr[c]) * z_v[c]));
 }
 
 }  // namespace frazil

@@ -1,4 +1,7 @@
 #include <bit>
+#include <atomic>
+#include <cstdlib>
+#include <cstdio>
 #include <cmath>
 
 #include "frazil/base/error.h"
@@ -68,15 +71,14 @@ struct Cut {
 
     void add_cluster(std::uint32_t index) {
         const TreeNode& node = tree.nodes[index];
+        const float trace = node.covariance[0] + node.covariance[1] + node.covariance[2];
+        float scale = 1.0f;
+        if (estimator == Estimator::noise_free && trace > 0.0f) scale += 2.0f * node.footprint / trace;
         Source source;
         source.center = {node.center.x, node.center.y, node.center.z};
-        float scale = 1.0f;
-        if (estimator == Estimator::noise_free) {
-            const float trace = node.covariance[0] + node.covariance[1] + node.covariance[2];
-            scale = trace > 0.0f ? 1.0f + 2.0f * node.footprint / trace : 1.0f;
-        }
-        for (int i = 0; i < 6; ++i) source.covariance[i] = node.covariance[i] * scale;
-        source.power_offset = {node.power_offset.x, node.power_offset.y, node.power_offset.z};
+        for (int i = 0; i < 6; ++i) source.covariance[i] = node.covariance[i] * (i < 3 ? scale : 2.0f * scale);
+        source.trace = trace * scale;
+        source.power_offset = {2.0f * node.power_offset.x, 2.0f * node.power_offset.y, 2.0f * node.power_offset.z};
         source.area = node.area;
         list.sources.push_back(source);
         add_powers(&tree.node_powers[index * 3 * tree.groups], 1.0f);
@@ -86,11 +88,11 @@ struct Cut {
     void add_disc(std::uint32_t p, const V3f& center, float share) {
         const float area = tree.areas[p] * share;
         const V3f& n = tree.normals[p];
-        const float variance = estimator == Estimator::noise_free ? 0.25f * area * kInvPi : 0.0f;
+        const float v = estimator == Estimator::noise_free ? 0.25f * area * kInvPi : 0.0f;
         list.sources.push_back({{center.x, center.y, center.z},
-                                {variance * (1.0f - n.x * n.x), variance * (1.0f - n.y * n.y),
-                                 variance * (1.0f - n.z * n.z), -variance * n.x * n.y, -variance * n.x * n.z,
-                                 -variance * n.y * n.z},
+                                {v * (1.0f - n.x * n.x), v * (1.0f - n.y * n.y), v * (1.0f - n.z * n.z),
+                                 -2.0f * v * n.x * n.y, -2.0f * v * n.x * n.z, -2.0f * v * n.y * n.z},
+                                2.0f * v,
                                 {0.0f, 0.0f, 0.0f},
                                 area});
         add_powers(&tree.irradiance[p * tree.groups].x, area);
@@ -116,8 +118,12 @@ struct Cut {
             const std::uint32_t index = stack.back();
             stack.pop_back();
             const TreeNode& node = tree.nodes[index];
-            const float largest = rule.largest_radius(squared_distance(box, node.center));
-            if (node.point_count > 1 && node.radius <= largest) {
+            const float q = squared_distance(box, node.center);
+            const float beyond = node.radius + tree.table.reach;
+            if (q > beyond * beyond) continue;
+            const float largest = rule.largest_radius(q);
+            const float reach = estimator == Estimator::noise_free ? 2.0f * std::sqrt(node.footprint) : 0.0f;
+            if (node.point_count > 1 && node.radius + reach <= largest) {
                 add_cluster(index);
             } else if (node.child_count > 0) {
                 for (std::uint32_t k = node.child_count; k-- > 0;) stack.push_back(node.first_child + k);
@@ -155,14 +161,19 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
 
     // Bring the shading points into Morton order, so that a block of them lies together.
     const MortonGrid grid(tree.bounds);
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order(count);
-    for (std::size_t i = 0; i < count; ++i) order[i] = {grid.code(positions[i]), static_cast<std::uint32_t>(i)};
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    order.reserve(count);
+    const float reach = tree.table.reach + tree.bounds.size().length() * 1e-3f;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (squared_distance(tree.bounds, positions[i]) > reach * reach) continue;  // exactly zero
+        order.emplace_back(grid.code(positions[i]), static_cast<std::uint32_t>(i));
+    }
     std::sort(order.begin(), order.end());
 
     const OpeningRule rule(tree.profile, tree.table, options.tolerance);
     const RampHinges ramp = hinges_of(tree.ramp, tree.ramp_scale);
     constexpr std::size_t block_size = 16;
-    parallel_for(count, block_size, [&](std::size_t begin, std::size_t end) {
+    parallel_for(order.size(), block_size, [&](std::size_t begin, std::size_t end) {
         Cut cut{tree, rule, options.estimator, {}, {}};
         BlockSums block;
         block.lanes = end - begin;
@@ -176,6 +187,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
             box.extendBy(p);
         }
         cut.build(box);
+        if (getenv("FZDBG")) { static std::atomic<long> n{0}, b{0}; n += cut.list.sources.size(); if (++b % 2000 == 0) fprintf(stderr, "src/block %ld size %g\n", long(n)/long(b), box.size().length()); }
         add_sources(tree.table, ramp, cut.list, tree.groups, block);
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t lane = i - begin, to = order[i].second;

@@ -23,38 +23,52 @@ RampHinges hinges_of(const Ramp& ramp, const Rgb& scale) {
     return out;
 }
 
-void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
-                 BlockSums& block) {
+void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
+                        BlockSums& block) {
     const std::size_t row = 3 * groups;
-    for (std::size_t s = 0; s < list.sources.size(); ++s) {
-        const Source& source = list.sources[s];
-        const auto& cov = source.covariance;
-        const auto& off = source.power_offset;
-        for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+    std::vector<double> exitance(row);
+    for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+        std::fill(exitance.begin(), exitance.end(), 0.0);
+        double coverage[3] = {0.0, 0.0, 0.0};
+        for (std::size_t s = 0; s < list.sources.size(); ++s) {
+            const Source& source = list.sources[s];
+            const auto& cov = source.covariance;
+            const auto& off = source.power_offset;
             const float dx = source.center[0] - block.x[lane], dy = source.center[1] - block.y[lane],
                         dz = source.center[2] - block.z[lane];
             const float q = dx * dx + dy * dy + dz * dz;
-            const float trace = cov[0] + cov[1] + cov[2];
-            const float along = dx * (cov[0] * dx + 2.0f * (cov[3] * dy + cov[4] * dz)) +
-                                dy * (cov[1] * dy + 2.0f * cov[5] * dz) + dz * cov[2] * dz;
-            const float lean = 2.0f * (dx * off[0] + dy * off[1] + dz * off[2]);
-            const float r = ramp.is_flat ? 0.0f : std::sqrt(q);
+            const float trace = source.trace;
+            const float along =
+                dx * (cov[0] * dx + cov[3] * dy + cov[4] * dz) + dy * (cov[1] * dy + cov[5] * dz) + dz * cov[2] * dz;
+            const float lean = dx * off[0] + dy * off[1] + dz * off[2];
+            // Mean and variance of the distance over the source.
+            const float variance = std::max(0.0f, along / (q + trace + 1e-30f));
+            const float mean_r = std::sqrt(std::max(0.0f, q + trace + lean - variance));
+            const float half_width = std::sqrt(3.0f * variance) + 1e-6f * mean_r + 1e-30f;
             for (int c = 0; c < 3; ++c) {
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;
                 float lit = even + f.slope * lean;
                 if (!ramp.is_flat) {
-                    float color = ramp.first[c];
+                    // Average each hinge over a uniform spread of distances.
+                    float color = ramp.first[c], slope = 0.0f;
                     for (const auto& hinge : ramp.hinges) {
-                        color += hinge.slope_change[c] * std::max(0.0f, r - hinge.distance);
+                        const float x = mean_r - hinge.distance;
+                        const float part = std::clamp(0.5f + 0.5f * x / half_width, 0.0f, 1.0f);
+                        color += hinge.slope_change[c] * (part * part * half_width + std::max(0.0f, x - half_width));
+                        slope += hinge.slope_change[c] * part;
                     }
-                    lit *= color;
+                    lit = lit * color + 2.0f * std::sqrt(q) * f.slope * variance * slope;
                 }
-                block.coverage[c][lane] += even * source.area;
+                coverage[c] += double(even) * source.area;
                 for (std::size_t g = 0; g < groups; ++g) {
-                    block.exitance[(3 * g + c) * kBlockLanes + lane] += lit * list.powers[s * row + 3 * g + c];
+                    exitance[3 * g + c] += double(lit) * list.powers[s * row + 3 * g + c];
                 }
             }
+        }
+        for (int c = 0; c < 3; ++c) block.coverage[c][lane] += static_cast<float>(coverage[c]);
+        for (std::size_t c = 0; c < row; ++c) {
+            block.exitance[c * kBlockLanes + lane] += static_cast<float>(exitance[c]);
         }
     }
 }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "frazil/translucency/kernel_table.h"
@@ -19,8 +20,9 @@ inline constexpr std::size_t kBlockLanes = 64;  // shading points of a block, at
 
 struct Source {
     std::array<float, 3> center;
-    std::array<float, 6> covariance;    // xx, yy, zz, xy, xz, yz
-    std::array<float, 3> power_offset;  // from center to the centre of power
+    std::array<float, 6> covariance;    // xx, yy, zz, and twice xy, xz, yz
+    float trace;                        // of the covariance
+    std::array<float, 3> power_offset;  // twice the way from center to the centre of power
     float area;
 };
 
@@ -55,8 +57,15 @@ struct RampHinges {
 };
 RampHinges hinges_of(const Ramp& ramp, const Rgb& scale);
 
-// Add every source's share to the block's sums.
+// Add every source's share to the block's sums, with the widest SIMD instructions that the processor has.
 void add_sources(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
                  BlockSums& block);
+
+// The same one value after the other, summed in double precision: what tests compare with.
+void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
+                        BlockSums& block);
+
+// The instruction set that add_sources uses here, e.g. "AVX3".
+std::string simd_target();
 
 }  // namespace frazil

@@ -9,13 +9,13 @@ namespace {
 
 constexpr int kN = KernelTable::kCoefficients;
 
-// The power-basis polynomial in t in [0, 1] through f at the Chebyshev nodes.
+// The power-basis polynomial in t - 1/2 for t in [0, 1] through f at the Chebyshev nodes.
 template <class Function>
 std::array<double, kN> fit(const Function& f) {
     std::array<double, kN> node, divided;
     for (int i = 0; i < kN; ++i) {
-        node[i] = 0.5 - 0.5 * std::cos(3.14159265358979323846 * (i + 0.5) / kN);
-        divided[i] = f(node[i]);
+        node[i] = -0.5 * std::cos(3.14159265358979323846 * (i + 0.5) / kN);
+        divided[i] = f(node[i] + 0.5);
     }
     for (int order = 1; order < kN; ++order) {
         for (int i = kN - 1; i >= order; --i) divided[i] = (divided[i] - divided[i - 1]) / (node[i] - node[i - order]);
@@ -51,7 +51,7 @@ KernelTable tabulate(const Profile& profile) {
     const double octaves = std::log2(1.0 + wanted * wanted / (z0 * z0));
     table.split = octaves <= 16.0 ? 1 : 0;
     const int pieces = 1 << table.split;
-    const int used = std::min(KernelTable::kSegments, static_cast<int>(std::ceil(octaves * pieces)));
+    const int used = std::min(KernelTable::kSegments - 1, static_cast<int>(std::ceil(octaves * pieces)));
     table.inverse_z0_squared = static_cast<float>(1.0 / (z0 * z0));
     for (int s = 0; s < used; ++s) {
         const double octave = std::ldexp(1.0, s / pieces);
@@ -76,7 +76,7 @@ KernelTable::Jet KernelTable::eval(int channel, float q) const {
     const auto bits = std::bit_cast<std::uint32_t>(u) - std::bit_cast<std::uint32_t>(1.0f);
     const std::uint32_t segment = bits >> (23 - split);
     const std::uint32_t below = bits & ((1u << (23 - split)) - 1u);
-    const float t = static_cast<float>(below) * std::ldexp(1.0f, split - 23);
+    const float t = static_cast<float>(below) * std::ldexp(1.0f, split - 23) - 0.5f;
     const float t_per_q = inverse_z0_squared * std::ldexp(1.0f, split - static_cast<int>(bits >> 23));
     const auto& c = coefficient[channel];
     float value = c[kN - 1][segment], slope = 0.0f, curvature = 0.0f;

@@ -15,9 +15,9 @@
 namespace frazil {
 
 struct KernelTable {
-    static constexpr int kSegments = 32, kCoefficients = 6;
+    static constexpr int kSegments = 32, kCoefficients = 6;  // the last segment stays zero
 
-    // coefficient[channel][power][segment]
+    // coefficient[channel][power][segment], in powers of t - 1/2 for t in [0, 1) across the segment
     alignas(64) std::array<std::array<std::array<float, kSegments>, kCoefficients>, 3> coefficient{};
     float inverse_z0_squared = 1.0f;  // u = 1 + q * inverse_z0_squared
     int split = 0;                    // every octave has 2^split segments

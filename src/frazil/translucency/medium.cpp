@@ -12,8 +12,8 @@ void check_medium(const Medium& medium, const std::string& path) {
     for (int c = 0; c < 3; ++c) {
         const float scatter = medium.sigma_s_prime[c], absorb = medium.sigma_a[c];
         if (!std::isfinite(scatter) || scatter < 0.0f) {
-            throw ValueError(
-                str(path, ": sigma_s_prime must be >= 0 and finite, got ", scatter, ". It is a coefficient per metre."));
+            throw ValueError(str(path, ": sigma_s_prime must be >= 0 and finite, got ", scatter,
+                                 ". It is a coefficient per metre."));
         }
         if (!std::isfinite(absorb) || absorb < 0.0f) {
             throw ValueError(
@@ -35,7 +35,8 @@ Medium medium_from_albedo(const Rgb& albedo, const Rgb& mean_free_path, float et
     const double boundary = dipole_boundary(eta);
     for (int c = 0; c < 3; ++c) {
         if (!(albedo[c] >= 0.0f && albedo[c] < 1.0f)) {
-            throw ValueError(str("Medium: albedo must be in [0, 1), got ", albedo[c], ". Use less than 1, e.g. 0.999."));
+            throw ValueError(
+                str("Medium: albedo must be in [0, 1), got ", albedo[c], ". Use less than 1, e.g. 0.999."));
         }
         if (!(mean_free_path[c] > 0.0f && std::isfinite(mean_free_path[c]))) {
             throw ValueError(

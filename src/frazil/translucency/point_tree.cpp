@@ -21,8 +21,8 @@ void check_points(const PointSet& points, std::size_t irradiance_count, std::siz
     }
     if (groups == 0) throw ValueError("PointTree: irradiance must have at least one light group, got 0.");
     if (irradiance_count != n * groups) {
-        throw ValueError(str("PointTree: irradiance must have one row per point (", n, " x ", groups,
-                             " groups), got ", irradiance_count, " values."));
+        throw ValueError(str("PointTree: irradiance must have one row per point (", n, " x ", groups, " groups), got ",
+                             irradiance_count, " values."));
     }
     for (std::size_t k = 0; k < n; ++k) {
         if (!is_finite(points.positions[k])) {
@@ -42,9 +42,8 @@ struct Keyed {
 
 // Sort by code; equal codes keep the order of their indices.
 void sort_by_code(std::vector<Keyed>& keys) {
-    std::sort(keys.begin(), keys.end(), [](const Keyed& a, const Keyed& b) {
-        return a.code != b.code ? a.code < b.code : a.index < b.index;
-    });
+    std::sort(keys.begin(), keys.end(),
+              [](const Keyed& a, const Keyed& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });
 }
 
 // Split nodes at the bits of their codes, level by level. Returns where each level begins.

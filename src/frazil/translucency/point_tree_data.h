@@ -17,12 +17,12 @@
 namespace frazil {
 
 struct TreeNode {
-    V3f center{0.0f};                 // of area
+    V3f center{0.0f};                   // of area
     std::array<float, 6> covariance{};  // of area: xx, yy, zz, xy, xz, yz
-    V3f power_offset{0.0f};           // centre of power (summed over groups and channels) - center
+    V3f power_offset{0.0f};             // centre of power (summed over groups and channels) - center
     float area = 0.0f;
-    float footprint = 0.0f;        // variance along each tangent that the points' own footprints add
-    float radius = 0.0f;           // of the sphere about center that holds all points
+    float footprint = 0.0f;                          // variance along each tangent that the points' own footprints add
+    float radius = 0.0f;                             // of the sphere about center that holds all points
     std::uint32_t first_child = 0, child_count = 0;  // no children: a leaf
     std::uint32_t first_point = 0, point_count = 0;
 };
