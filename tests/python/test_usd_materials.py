@@ -102,8 +102,16 @@ def test_ice_defaults_follow_the_table(stage):
     model, scene = read_model(stage)
     assert scene.warnings == []
     defaults = {row.name: row.default for row in ICE_INPUTS}
-    for name in ("roughness", "specular", "translucency", "compensation", "compensation_limit",
-                 "compensation_strength", "spacing", "ramp_preserve_energy"):
+    for name in (
+        "roughness",
+        "specular",
+        "translucency",
+        "compensation",
+        "compensation_limit",
+        "compensation_strength",
+        "spacing",
+        "ramp_preserve_energy",
+    ):
         expected = defaults[name]
         assert getattr(model, name) == (expected if isinstance(expected, str) else pytest.approx(expected)), name
     assert tuple(model.tint) == defaults["tint"]
@@ -171,8 +179,15 @@ def test_preview_surface_inputs(stage):
     shader.CreateInput("diffuseColor", COLOR).Set(Gf.Vec3f(0.1, 0.2, 0.3))
     shader.CreateInput("emissiveColor", COLOR).Set(Gf.Vec3f(5, 6, 7))
     shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(1)
-    for name, value in (("metallic", 0.25), ("roughness", 0.3), ("clearcoat", 0.6), ("clearcoatRoughness", 0.05),
-                        ("opacity", 0.5), ("opacityThreshold", 0.1), ("ior", 1.33)):
+    for name, value in (
+        ("metallic", 0.25),
+        ("roughness", 0.3),
+        ("clearcoat", 0.6),
+        ("clearcoatRoughness", 0.05),
+        ("opacity", 0.5),
+        ("opacityThreshold", 0.1),
+        ("ior", 1.33),
+    ):
         shader.CreateInput(name, FLOAT).Set(value)
     model, scene = read_model(stage)
     assert scene.warnings == []
@@ -180,8 +195,15 @@ def test_preview_surface_inputs(stage):
     np.testing.assert_allclose(model.emissive_color, [5, 6, 7])
     assert model.use_specular_workflow
     assert not model.uses_display_color
-    for name, value in (("metallic", 0.25), ("roughness", 0.3), ("clearcoat", 0.6), ("clearcoat_roughness", 0.05),
-                        ("opacity", 0.5), ("opacity_threshold", 0.1), ("ior", 1.33)):
+    for name, value in (
+        ("metallic", 0.25),
+        ("roughness", 0.3),
+        ("clearcoat", 0.6),
+        ("clearcoat_roughness", 0.05),
+        ("opacity", 0.5),
+        ("opacity_threshold", 0.1),
+        ("ior", 1.33),
+    ):
         assert getattr(model, name) == pytest.approx(value), name
 
 
@@ -200,9 +222,17 @@ def test_texture_with_transform_scale_bias_and_primvar(stage, tmp_path):
     set_primvar(quad, "map1", TEXCOORDS, "vertex", [Gf.Vec2f(0.25, 0.5)] * 4)
     shader = bind_preview(stage, quad)
     float4 = Sdf.ValueTypeNames.Float4
-    connect_texture(stage, shader, "diffuseColor", COLOR, tmp_path / "t.png", wrapS=(TOKEN, "clamp"),
-                    wrapT=(TOKEN, "mirror"), scale=(float4, Gf.Vec4f(0.5, 0.6, 0.7, 1)),
-                    bias=(float4, Gf.Vec4f(0.1, 0, 0, 0)))
+    connect_texture(
+        stage,
+        shader,
+        "diffuseColor",
+        COLOR,
+        tmp_path / "t.png",
+        wrapS=(TOKEN, "clamp"),
+        wrapT=(TOKEN, "mirror"),
+        scale=(float4, Gf.Vec4f(0.5, 0.6, 0.7, 1)),
+        bias=(float4, Gf.Vec4f(0.1, 0, 0, 0)),
+    )
     model, scene = read_model(stage)
     assert scene.warnings == []
     lookup = model.diffuse_color
@@ -216,8 +246,14 @@ def test_texture_with_transform_scale_bias_and_primvar(stage, tmp_path):
 
 @pytest.mark.parametrize(
     ("color_space", "kind", "channels", "linear"),
-    [("sRGB", oiio.UINT8, 1, True), ("raw", oiio.UINT8, 3, False), ("auto", oiio.UINT8, 3, True),
-     ("auto", oiio.UINT8, 1, False), ("auto", oiio.UINT16, 3, False), ("auto", oiio.UINT8, 4, True)],
+    [
+        ("sRGB", oiio.UINT8, 1, True),
+        ("raw", oiio.UINT8, 3, False),
+        ("auto", oiio.UINT8, 3, True),
+        ("auto", oiio.UINT8, 1, False),
+        ("auto", oiio.UINT16, 3, False),
+        ("auto", oiio.UINT8, 4, True),
+    ],
 )
 def test_source_color_space(stage, tmp_path, color_space, kind, channels, linear):
     write_image(tmp_path / "t.png", np.full((1, 1, channels), 128 / 255), kind)
@@ -243,8 +279,14 @@ def test_scalar_channels_of_one_texture(stage, tmp_path):
 
 def test_a_missing_texture_gives_its_fallback(stage):
     shader = bind_preview(stage, add_quad(stage, "/Quad"))
-    connect_texture(stage, shader, "diffuseColor", COLOR, "./nowhere.png",
-                    fallback=(Sdf.ValueTypeNames.Float4, Gf.Vec4f(0.3, 0.2, 0.1, 1)))
+    connect_texture(
+        stage,
+        shader,
+        "diffuseColor",
+        COLOR,
+        "./nowhere.png",
+        fallback=(Sdf.ValueTypeNames.Float4, Gf.Vec4f(0.3, 0.2, 0.1, 1)),
+    )
     model, scene = read_model(stage)
     np.testing.assert_allclose(model.diffuse_color, [0.3, 0.2, 0.1], rtol=1e-6)
     assert any(w.startswith("/Material/Texture_diffuseColor: ") and "nowhere.png" in w for w in scene.warnings)

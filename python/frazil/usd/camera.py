@@ -48,7 +48,11 @@ def _read_or_frame(context: ReadContext, scene: Scene, prim: Usd.Prim) -> Camera
     if is_singular(matrix):
         context.warn(prim.GetPath(), "its transform cannot be inverted. The scene's bounds are framed.")
         return frame_scene(scene)
-    return _read_camera(context, prim, matrix)
+    try:
+        return _read_camera(context, prim, matrix)
+    except (ValueError, TypeError) as error:
+        context.warn(prim.GetPath(), f"cannot be read: {error}. The scene's bounds are framed.")
+        return frame_scene(scene)
 
 
 def _read_camera(context: ReadContext, prim: Usd.Prim, matrix: np.ndarray) -> Camera:
@@ -81,7 +85,9 @@ def _read_camera(context: ReadContext, prim: Usd.Prim, matrix: np.ndarray) -> Ca
     near, far = (float(v) * float(scale[2]) for v in context.get(schema.GetClippingRangeAttr(), (1.0, 1e6)))
     is_orthographic = context.get(schema.GetProjectionAttr()) == UsdGeom.Tokens.orthographic
     if not (math.isfinite(near) and far > near and (near > 0 or is_orthographic)):
-        context.warn(prim.GetPath(), f"clippingRange must be 0 < near < far, got ({near}, {far}) m. Nothing is clipped.")
+        context.warn(
+            prim.GetPath(), f"clippingRange must be 0 < near < far, got ({near}, {far}) m. Nothing is clipped."
+        )
         near, far = 1e-4, 1e12
     if context.get(schema.GetClippingPlanesAttr()):
         context.warn(prim.GetPath(), "clippingPlanes are not supported. They are left out.")

@@ -23,10 +23,6 @@ class MeshPart:
     subset: str = ""
 
 
-class UnusableGeometry(ValueError):
-    """A prim that cannot be rendered; its message begins with the prim's path."""
-
-
 def read_mesh(context: ReadContext, prim: Usd.Prim, texcoord_name: str | None) -> list[MeshPart]:
     """The prim's mesh at the frame, in its own frame and units, cut by material subsets.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Usd
 
 from .._frazil import Mesh
 from .context import ReadContext
@@ -134,9 +134,7 @@ def _surface_of_revolution(rows: np.ndarray, joins: np.ndarray, axis: str) -> Me
     scale = np.abs(rows[:, :2]).max()
     has_lower = np.broadcast_to(rows[row, 0] > 1e-9 * scale, a.shape)
     has_upper = np.broadcast_to(rows[row + 1, 0] > 1e-9 * scale, a.shape)
-    triangles = np.concatenate(
-        [np.stack([a, b, c], -1)[has_lower], np.stack([a, c, d], -1)[has_upper]]
-    )
+    triangles = np.concatenate([np.stack([a, b, c], -1)[has_lower], np.stack([a, c, d], -1)[has_upper]])
     return _mesh(positions, triangles, normals, uvs, axis)
 
 

@@ -1,11 +1,11 @@
-"""The walk over a stage: every visible leaf as an object, with meshes shared by native instances and PointInstancers."""
+"""The walk over a stage: every visible leaf as an object; native instances and PointInstancers share meshes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdShade
+from pxr import Tf, Usd, UsdGeom, UsdShade
 
 from .._frazil import Scene
 from .context import ReadContext, is_singular, to_array
@@ -75,7 +75,15 @@ class StageWalker:
                 )
 
     def _place(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], depth: int) -> None:
-        """Add the leaf once per matrix (N, 4, 4), prim to world, under the N names."""
+        """Add the leaf once per matrix (N, 4, 4), prim to world, under the N names; a warning where it is broken."""
+        try:
+            self._place_unchecked(prim, matrices, paths, depth)
+        except (ValueError, TypeError, Tf.ErrorException) as error:
+            # One broken prim must not lose the scene.
+            said = " ".join(str(error).removeprefix(f"{prim.GetPath()}: ").split())
+            self._context.warn(prim.GetPath(), f"{said} It is left out.")
+
+    def _place_unchecked(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], depth: int) -> None:
         if prim.IsA(UsdGeom.PointInstancer):
             self._place_instancer(prim, matrices, paths, depth)
         elif prim.IsA(UsdGeom.Gprim):
@@ -119,19 +127,12 @@ class StageWalker:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), texcoord_name)
         if key not in self._meshes:
-            self._meshes[key] = []
-            try:
-                if prim.IsA(UsdGeom.Mesh):
-                    parts = read_mesh(self._context, prim, texcoord_name)
-                else:
-                    parts = [MeshPart(read_gprim(self._context, prim))]
-                self._meshes[key] = [
-                    (self._scene.add_mesh(part.mesh, str(prim.GetPath())), part.subset) for part in parts
-                ]
-            except ValueError as error:
-                # One broken mesh must not lose the scene.
-                message = str(error).removeprefix(f"{prim.GetPath()}: ")
-                self._context.warn(prim.GetPath(), f"{message} It is left out.")
+            self._meshes[key] = []  # stays so where reading fails, so that it is tried once
+            if prim.IsA(UsdGeom.Mesh):
+                parts = read_mesh(self._context, prim, texcoord_name)
+            else:
+                parts = [MeshPart(read_gprim(self._context, prim))]
+            self._meshes[key] = [(self._scene.add_mesh(p.mesh, str(prim.GetPath())), p.subset) for p in parts]
         return self._meshes[key]
 
     # -- PointInstancer
@@ -198,7 +199,7 @@ class StageWalker:
         if len(transforms) != len(prototypes):
             context.warn(prim.GetPath(), "its arrays disagree in length. It is left out.")
             return nothing
-        own = np.asarray(transforms, dtype=np.float64).reshape(-1, 4, 4)
+        own = np.array(transforms, dtype=np.float64).reshape(-1, 4, 4)
         local = {
             i: to_array(context.transforms.GetLocalTransformation(root)[0])
             for i, root in enumerate(roots)

@@ -96,8 +96,12 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
             context.warn(prim.GetPath(), f"angle must be in 0..360 degrees, got {angle}. 0.53 is used.")
             angle = 0.53
         return DistantLight(angle)
-    sizes = {"RectLight": (("width", 1.0), ("height", 1.0)), "DiskLight": (("radius", 0.5),),
-             "SphereLight": (("radius", 0.5),), "CylinderLight": (("length", 1.0), ("radius", 0.5))}.get(kind)
+    sizes = {
+        "RectLight": (("width", 1.0), ("height", 1.0)),
+        "DiskLight": (("radius", 0.5),),
+        "SphereLight": (("radius", 0.5),),
+        "CylinderLight": (("length", 1.0), ("radius", 0.5)),
+    }.get(kind)
     if sizes is None:
         context.warn(prim.GetPath(), f"lights of type {kind or 'none'} are not supported. It is left out.")
         return None

@@ -24,8 +24,20 @@ ICE_SHADER = "frazil:ice"
 
 # Inputs of shaders that Frazil does not know, and the input of UsdPreviewSurface that they come nearest to.
 _NEAREST_INPUTS = {
-    "diffuseColor": ("diffuseColor", "base_color", "baseColor", "diffuse_color", "diffuse_reflection_color",
-                     "basecolor", "diffuse", "Kd", "color", "albedo", "tint", "displayColor"),
+    "diffuseColor": (
+        "diffuseColor",
+        "base_color",
+        "baseColor",
+        "diffuse_color",
+        "diffuse_reflection_color",
+        "basecolor",
+        "diffuse",
+        "Kd",
+        "color",
+        "albedo",
+        "tint",
+        "displayColor",
+    ),
     "roughness": ("roughness", "specular_roughness", "specularRoughness", "reflection_roughness_constant"),
     "metallic": ("metallic", "metalness", "metallic_constant"),
     "ior": ("ior", "specular_IOR", "specular_ior", "IOR"),
@@ -73,7 +85,9 @@ class MaterialReader:
         binding = UsdShade.MaterialBindingAPI(prim).GetDirectBinding()
         path = binding.GetMaterialPath()
         if path:
-            self._context.warn(prim.GetPath(), f"is bound to <{path}>, which is no material. Its displayColor is shown.")
+            self._context.warn(
+                prim.GetPath(), f"is bound to <{path}>, which is no material. Its displayColor is shown."
+            )
 
     def _read(self, material: UsdShade.Material):
         shader, _, _ = material.ComputeSurfaceSource("frazil")  # or the universal one
@@ -96,7 +110,9 @@ class MaterialReader:
         has_sigma = sources["sigma_s_prime"] is not None or sources["sigma_a"] is not None
         has_albedo = sources["albedo"] is not None or sources["mean_free_path"] is not None
         if has_sigma and has_albedo:
-            self._context.warn(path, "has both albedo or mean_free_path and sigma_s_prime or sigma_a. The sigmas are used.")
+            self._context.warn(
+                path, "has both albedo or mean_free_path and sigma_s_prime or sigma_a. The sigmas are used."
+            )
         if has_sigma and values["sigma_s_prime"] is None:
             self._context.warn(path, "has sigma_a without sigma_s_prime. albedo and mean_free_path are used.")
             has_sigma = False
@@ -113,8 +129,17 @@ class MaterialReader:
             ramp_colors=colors,
             **{
                 name: values[name]
-                for name in ("roughness", "specular", "translucency", "tint", "ramp_preserve_energy", "compensation",
-                             "compensation_limit", "compensation_strength", "spacing")
+                for name in (
+                    "roughness",
+                    "specular",
+                    "translucency",
+                    "tint",
+                    "ramp_preserve_energy",
+                    "compensation",
+                    "compensation_limit",
+                    "compensation_strength",
+                    "spacing",
+                )
             },
         )
         return model, _texcoord_name(self._context, path, sources)
@@ -122,8 +147,10 @@ class MaterialReader:
     def _check_ramp(self, path, distances, colors):
         if len(distances) != len(colors):
             self._context.warn(
-                path, f"ramp_colors must have {len(distances)} values (one per ramp_distances), got {len(colors)}. "
-                      f"The ramp is left out.")
+                path,
+                f"ramp_colors must have {len(distances)} values (one per ramp_distances), got {len(colors)}. "
+                f"The ramp is left out.",
+            )
             return [], []
         if any(b <= a for a, b in zip(distances, distances[1:], strict=False)):
             self._context.warn(path, "ramp_distances must be strictly increasing. The ramp is left out.")
@@ -262,5 +289,3 @@ def _any_surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
             if UsdShade.Output.IsOutput(attribute):
                 return UsdShade.Shader(attribute.GetPrim())
     return None
-
-

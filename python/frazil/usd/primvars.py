@@ -22,9 +22,7 @@ _TEXCOORD_NAMES = ("st", "UVMap", "uv", "map1", "st0", "st_0", "Texture_uv")
 Primvar = tuple[np.ndarray, str]
 
 
-def read_primvar(
-    context: ReadContext, primvar: UsdGeom.Primvar, width: int, sizes: dict[str, int]
-) -> Primvar | None:
+def read_primvar(context: ReadContext, primvar: UsdGeom.Primvar, width: int, sizes: dict[str, int]) -> Primvar | None:
     """The primvar's values (N, width) float32, indices applied, and the core's interpolation.
 
     None (after a warning) where the values do not fit the mesh; `sizes` is what each interpolation needs.
@@ -86,9 +84,7 @@ def fit_primvar(
     return np.ascontiguousarray(array), interpolation
 
 
-def read_texcoords(
-    context: ReadContext, prim: Usd.Prim, name: str | None, sizes: dict[str, int]
-) -> Primvar | None:
+def read_texcoords(context: ReadContext, prim: Usd.Prim, name: str | None, sizes: dict[str, int]) -> Primvar | None:
     """The texture coordinates that the material asks for by `name`, else the usual ones."""
     primvars = UsdGeom.PrimvarsAPI(prim)
     for candidate in ([name] if name else []) + list(_TEXCOORD_NAMES):
@@ -112,9 +108,7 @@ def read_display_color(context: ReadContext, prim: Usd.Prim, sizes: dict[str, in
     return read_primvar(context, primvar, 3, sizes)
 
 
-def read_normals(
-    context: ReadContext, mesh: UsdGeom.PointBased, sizes: dict[str, int]
-) -> Primvar | None:
+def read_normals(context: ReadContext, mesh: UsdGeom.PointBased, sizes: dict[str, int]) -> Primvar | None:
     """Unit normals: primvars:normals where it is authored, else the normals attribute."""
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
     if primvar and primvar.HasAuthoredValue():

@@ -160,7 +160,9 @@ class ShaderReader:
                 result["st_rotation"] = float(self._value(reader, "rotation", 0.0))
                 result["st_translation"] = tuple(map(float, self._value(reader, "translation", (0, 0))))
             else:
-                self._context.warn(reader.GetPath(), "a second UsdTransform2d in a row is not supported. It is left out.")
+                self._context.warn(
+                    reader.GetPath(), "a second UsdTransform2d in a row is not supported. It is left out."
+                )
             if transforms > 8:
                 break
             reader = self._upstream(reader, "in")

@@ -154,9 +154,11 @@ def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level:
     return ReadContext(stage, name, time, wanted, subdivision_level), diagnostics
 
 
-def _first_line(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return lines[0] if lines else type(error).__name__
+def _first_line(error: Tf.ErrorException) -> str:
+    """What USD itself said, without where in its source."""
+    said = [getattr(e, "commentary", str(e)).strip() for e in error.args]
+    lines = [line.strip() for text in said for line in text.splitlines() if line.strip()]
+    return lines[0] if lines else "it cannot be opened"
 
 
 def _pass_on(context: ReadContext, diagnostics: UsdUtils.CoalescingDiagnosticDelegate) -> None:

@@ -14,50 +14,66 @@
 namespace frazil {
 namespace {
 
-constexpr int kMaxFaceSize = 15;        // Embree's
+constexpr std::size_t kMaxFaceSize = 15;        // Embree's
 constexpr float kCreaseMargin = 0.02f;       // of a patch, for normals beside creases
 constexpr float kSameSurface = 0.97f;        // cosine between normals of one vertex that are still one surface
 constexpr float kInfiniteSharpness = 10.0f;  // USD's
 
-// The cage without faces that Embree cannot take: fewer than three corners, or more than 15. `faces` tells where each
-// kept face (or piece of one) came from.
+// The cage without what Embree cannot take: faces of fewer than three corners, of more than 15, or that pass a vertex
+// twice. `faces` tells where each kept face (or piece of one) came from.
 struct CleanCage {
     ControlMesh cage;
     std::vector<std::int32_t> faces;
     std::vector<std::size_t> corners;  // the original corner of each kept corner
 };
 
+bool has_repeated_vertex(const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& scratch) {
+    scratch = vertices;
+    std::sort(scratch.begin(), scratch.end());
+    return std::adjacent_find(scratch.begin(), scratch.end()) != scratch.end();
+}
+
 CleanCage clean(const ControlMesh& cage, const std::string& path) {
     CleanCage result;
-    std::vector<std::int32_t> new_face(cage.face_vertex_counts.size(), -1);
+    std::vector<std::size_t> first_piece(cage.face_vertex_counts.size());
     ControlMesh& out = result.cage;
-    const auto add_corner = [&](std::size_t corner) {
-        out.face_vertex_indices.push_back(cage.face_vertex_indices[corner]);
-        result.corners.push_back(corner);
+    const auto add_face = [&](std::size_t face, const std::vector<std::size_t>& corners) {
+        out.face_vertex_counts.push_back(std::int32_t(corners.size()));
+        result.faces.push_back(std::int32_t(face));
+        for (const std::size_t corner : corners) {
+            out.face_vertex_indices.push_back(cage.face_vertex_indices[corner]);
+            result.corners.push_back(corner);
+        }
     };
     std::size_t first = 0;
+    std::vector<std::size_t> corners;
+    std::vector<std::int32_t> vertices, scratch;
     for (std::size_t face = 0; face < cage.face_vertex_counts.size(); ++face) {
         const int count = cage.face_vertex_counts[face];
-        new_face[face] = std::int32_t(out.face_vertex_counts.size());
-        if (count >= 3 && count <= kMaxFaceSize) {
-            out.face_vertex_counts.push_back(count);
-            result.faces.push_back(std::int32_t(face));
-            for (int i = 0; i < count; ++i) add_corner(first + i);
-        } else if (count > kMaxFaceSize) {
-            // Cut it into triangles; corner numbers ride along as a primvar.
-            ControlMesh polygon;
-            polygon.face_vertex_counts = {count};
-            for (int i = 0; i < count; ++i) {
-                polygon.positions.push_back(cage.positions[cage.face_vertex_indices[first + i]]);
-                polygon.face_vertex_indices.push_back(i);
-            }
-            for (const V3i& triangle : triangulate(polygon, path).mesh.triangles) {
-                out.face_vertex_counts.push_back(3);
-                result.faces.push_back(std::int32_t(face));
-                for (int i = 0; i < 3; ++i) add_corner(first + triangle[i]);
-            }
+        first_piece[face] = result.faces.size();
+        // Edges without length go: a corner whose vertex is the next one's, too.
+        corners.clear(), vertices.clear();
+        for (int i = 0; i < count; ++i) {
+            const std::int32_t vertex = cage.face_vertex_indices[first + i];
+            if (vertex == cage.face_vertex_indices[first + (i + 1) % count]) continue;
+            corners.push_back(first + i), vertices.push_back(vertex);
         }
         first += count;
+        if (corners.size() < 3) continue;
+        if (corners.size() <= kMaxFaceSize && !has_repeated_vertex(vertices, scratch)) {
+            add_face(face, corners);
+            continue;
+        }
+        ControlMesh polygon;
+        polygon.face_vertex_counts = {std::int32_t(corners.size())};
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            polygon.positions.push_back(cage.positions[vertices[i]]);
+            polygon.face_vertex_indices.push_back(std::int32_t(i));
+        }
+        for (const V3i& t : triangulate(polygon, path).mesh.triangles) {
+            if (has_repeated_vertex({vertices[t.x], vertices[t.y], vertices[t.z]}, scratch)) continue;
+            add_face(face, {corners[t.x], corners[t.y], corners[t.z]});
+        }
     }
     out.positions = cage.positions;
     out.crease_indices = cage.crease_indices;
@@ -67,7 +83,7 @@ CleanCage clean(const ControlMesh& cage, const std::string& path) {
     out.corner_sharpnesses = cage.corner_sharpnesses;
     out.is_boundary_smooth = cage.is_boundary_smooth;
     for (const std::int32_t hole : cage.hole_faces) {
-        for (std::size_t i = new_face[hole]; i < result.faces.size() && result.faces[i] == hole; ++i) {
+        for (std::size_t i = first_piece[hole]; i < result.faces.size() && result.faces[i] == hole; ++i) {
             out.hole_faces.push_back(std::int32_t(i));
         }
     }
@@ -567,6 +583,11 @@ void check_creases(const ControlMesh& cage, const std::string& path) {
     if (sharpnesses != cage.crease_lengths.size() && sharpnesses != edges) {
         throw ValueError(str(path, ": creaseSharpnesses must have ", cage.crease_lengths.size(),
                              " values (one per crease), got ", sharpnesses, "."));
+    }
+    for (const auto* values : {&cage.crease_sharpnesses, &cage.corner_sharpnesses}) {
+        for (const float value : *values) {
+            if (!(value >= 0.0f)) throw ValueError(str(path, ": sharpness must be >= 0, got ", value, "."));
+        }
     }
     if (cage.corner_indices.size() != cage.corner_sharpnesses.size()) {
         throw ValueError(str(path, ": cornerSharpnesses must have ", cage.corner_indices.size(),

@@ -8,6 +8,8 @@
 namespace frazil {
 namespace {
 
+constexpr float kLargestCoordinate = 1e15f;  // squares of lengths stay finite
+
 template <class T>
 void check_cage_primvar(const Primvar<T>& primvar, const ControlMesh& cage, const std::string& path, const char* name) {
     if (primvar.is_empty()) return;
@@ -123,9 +125,14 @@ Primvar<T> to_triangles(const Primvar<T>& primvar, const std::vector<std::int32_
 
 void check_control_mesh(const ControlMesh& cage, const std::string& path) {
     for (std::size_t i = 0; i < cage.positions.size(); ++i) {
-        if (!is_finite(cage.positions[i])) {
+        const V3f& p = cage.positions[i];
+        if (!is_finite(p)) {
             throw ValueError(str(path, ": points must be finite, got NaN or infinity at point ", i,
                                  ". Clean the mesh where it was made."));
+        }
+        if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kLargestCoordinate) {
+            throw ValueError(str(path, ": points must be within +-", kLargestCoordinate, ", got (", p.x, ", ", p.y, ", ",
+                                 p.z, ") at point ", i, ". Clean the mesh where it was made."));
         }
     }
     std::int64_t corners = 0;
