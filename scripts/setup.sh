@@ -71,6 +71,8 @@ make_venv() {
     python=$(find_python) || fail "python3 must be >= 3.10 with venv and headers. Set PYTHON to one."
     echo "setup: $venv with $python"
     "$python" -m venv --clear "$venv"
+    # What venv brings is as old as the system: 22.0 on Ubuntu 22.04, which has no --config-settings.
+    "$venv/bin/python" -m pip install -q --disable-pip-version-check --retries 5 "pip>=23.1"
 }
 
 install_python() {
