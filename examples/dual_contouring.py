@@ -7,17 +7,20 @@ Units: those of the field. Fields are negative inside and change by at most `kLi
 Not: level of detail, fields that touch the border of the box (the surface must close inside).
 """
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 Field = Callable[[np.ndarray], np.ndarray]
 
 kLipschitz = 1.5  # how steep a field may be before a block that it crosses can be overlooked
-kBlock = 6  # cells along the edge of a block that is evaluated as a whole, or not at all
+kBlock, kSubBlock = 12, 2  # cells along the edge of a block that is skipped as a whole where the field is large
 kRegularization = 0.03  # pull of a cell's vertex towards the mean of its crossings
-kChunk = 1 << 17  # points per call of the field
+kChunk = 1 << 15  # points per call of the field
 
 
 @dataclass
@@ -26,6 +29,17 @@ class Surface:
 
     positions: np.ndarray
     triangles: np.ndarray
+
+    def vertex_normals(self) -> np.ndarray:
+        """Smooth unit normals (V, 3)."""
+        a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
+        return _normalized(_sum_at(self.triangles, np.repeat(np.cross(b - a, c - a), 3, 0), len(self.positions)))
+
+    def sharpen(self, tips: np.ndarray, reach: float) -> None:
+        """Pull the vertex nearest to each of the tips (K, 3) onto it, where there is one within `reach`."""
+        distance, nearest = cKDTree(self.positions).query(tips)
+        near = distance < reach
+        self.positions[nearest[near]] = tips[near]
 
 
 def contour(field: Field, lower, upper, cell: float) -> Surface:
@@ -54,26 +68,32 @@ def contour(field: Field, lower, upper, cell: float) -> Surface:
 
 
 def evaluate(field: Field, points: np.ndarray) -> np.ndarray:
-    """Values (N,) of the field at points (N, 3), in pieces that stay in cache."""
-    parts = [field(points[i : i + kChunk]) for i in range(0, len(points), kChunk)]
+    """Values (N,) of the field at points (N, 3), in pieces that stay in cache, on all cores."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = list(pool.map(field, [points[i : i + kChunk] for i in range(0, len(points), kChunk)]))
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
 def _sample(field: Field, lower: np.ndarray, blocks: np.ndarray, cell: float) -> np.ndarray:
-    # Ask each block's centre whether the surface can pass through the block.
-    size = cell * kBlock
-    centers = lower + size * (np.indices(blocks).reshape(3, -1).T + 0.5)
-    coarse = evaluate(field, centers).reshape(blocks)
-    near = np.abs(coarse) < kLipschitz * size * 0.5 * np.sqrt(3.0)
-    values = np.ones(blocks * kBlock + 1, np.float32)
-    for axis in range(3):
-        coarse = np.repeat(coarse, kBlock, axis)
-    values[:-1, :-1, :-1] = np.where(coarse < 0, -1.0, 1.0)
+    # Ask the centres of blocks, then of sub-blocks, whether the surface can pass through.
+    shape = blocks * kBlock
+    values = np.ones(shape + 1, np.float32)
+    boxes, size = np.indices(blocks).reshape(3, -1).T, kBlock
+    while True:
+        centers = evaluate(field, lower + cell * size * (boxes + 0.5))
+        near = np.abs(centers) < kLipschitz * cell * size * 0.5 * np.sqrt(3.0)
+        for box in boxes[~near & (centers < 0)] * size:
+            values[tuple(slice(k, k + size) for k in box)] = -1.0
+        boxes = boxes[near]
+        if size <= kSubBlock:
+            break
+        ratio = size // kSubBlock
+        boxes = (boxes[:, None] * ratio + np.indices((ratio,) * 3).reshape(3, -1).T).reshape(-1, 3)
+        size = kSubBlock
 
-    # Evaluate every grid point of those blocks, block by block (so that chunks are compact), borders once.
-    corner = np.argwhere(near) * kBlock
-    offsets = np.indices((kBlock + 1,) * 3).reshape(3, -1).T
-    grid = (corner[:, None] + offsets).reshape(-1, 3)
+    # Evaluate every grid point of the sub-blocks that remain, once.
+    offsets = np.indices((size + 1,) * 3).reshape(3, -1).T
+    grid = (boxes[:, None] * size + offsets).reshape(-1, 3)
     flat = np.ravel_multi_index(grid.T, values.shape)
     _, first = np.unique(flat, return_index=True)
     first.sort()
@@ -155,8 +175,10 @@ def _connect(crossings, points, normals, lower, cell, shape) -> Surface:
     quad = np.where(entering[:, None], ring, ring[:, ::-1])
     first = np.stack([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]], 1)
     second = np.stack([quad[:, [1, 2, 3]], quad[:, [1, 3, 0]]], 1)
-    agree = [np.min(np.sum(face_normals(positions, t.reshape(-1, 3)).reshape(-1, 2, 3) * n[:, None], -1), 1)
-             for t in (first, second)]
+    agree = [
+        np.min(np.sum(face_normals(positions, t.reshape(-1, 3)).reshape(-1, 2, 3) * n[:, None], -1), 1)
+        for t in (first, second)
+    ]
     triangles = np.where((agree[0] >= agree[1])[:, None, None], first, second).reshape(-1, 3)
     return Surface(positions, triangles)
 
@@ -176,11 +198,7 @@ def corner_normals(surface: Surface, crease_degrees: float = 38.0) -> np.ndarray
     vertex = surface.triangles.reshape(-1)
     face = np.repeat(np.arange(len(surface.triangles)), 3)
 
-    def vertex_sum(v):
-        return np.stack([np.bincount(vertex, v[face, k], len(surface.positions)) for k in range(3)], 1)
-
-    smooth = _normalized(vertex_sum(weighted))
-    result = smooth[vertex]
+    result = surface.vertex_normals()[vertex]
     # Where faces spread, each corner averages only the faces within the crease angle of its own.
     limit = np.cos(np.radians(crease_degrees))
     aligned = np.sum(unit[face] * result, 1)
@@ -195,6 +213,11 @@ def corner_normals(surface: Surface, crease_degrees: float = 38.0) -> np.ndarray
         near = np.einsum("gik,gjk->gij", n, n) > limit
         result[group] = _normalized(np.einsum("gij,gjk->gik", near, weighted[face[group]]))
     return result.reshape(-1, 3, 3)
+
+
+def _sum_at(triangles: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    vertex = triangles.reshape(-1)
+    return np.stack([np.bincount(vertex, values[:, k], count) for k in range(values.shape[1])], 1)
 
 
 def _normalized(v: np.ndarray) -> np.ndarray:

@@ -7,29 +7,30 @@ Not: snow, rocks and ground (see scenery.py).
 """
 
 import numpy as np
-from noise import Noise
+
+from noise import Noise, swirl
 from spires import Spire, bounds, distance, make_spire, smooth_min
 
-kLower = np.array([-3.9, -0.42, -2.7])
-kUpper = np.array([3.9, 3.5, 2.3])
+kLower = np.array([-3.5, -0.3, -2.2])
+kUpper = np.array([3.5, 3.4, 1.9])
 kBlend = 0.05  # metres over which shards grow together
 
 # base x, z; tip x, y, z; radius at the base.
 kShards = [
-    (-0.55, -0.25, -0.28, 3.02, -0.45, 0.66),
-    (-0.95, 0.05, -1.22, 2.15, 0.05, 0.42),
-    (-0.10, 0.10, 0.22, 1.92, 0.25, 0.38),
-    (0.95, -0.35, 1.48, 2.42, -0.55, 0.52),
-    (1.30, 0.00, 2.00, 1.62, 0.10, 0.36),
-    (0.55, -1.05, 0.62, 2.62, -1.45, 0.46),
-    (-1.65, -0.55, -2.25, 1.92, -0.85, 0.44),
-    (-2.10, -0.20, -2.85, 1.22, -0.10, 0.34),
-    (2.00, -0.60, 2.75, 1.62, -0.95, 0.42),
-    (2.45, -0.10, 3.05, 0.98, 0.15, 0.28),
-    (-0.50, 0.75, -0.68, 1.22, 1.05, 0.26),
-    (0.45, 0.75, 0.78, 1.02, 1.10, 0.24),
-    (-1.25, 0.62, -1.72, 1.02, 0.92, 0.25),
-    (1.35, 0.65, 1.72, 0.86, 0.98, 0.22),
+    (-0.45, -0.20, -0.35, 3.05, -0.50, 1.05),
+    (-0.95, 0.10, -1.18, 2.15, 0.05, 0.62),
+    (0.05, 0.25, 0.22, 1.75, 0.45, 0.52),
+    (0.70, -0.35, 1.05, 2.50, -0.60, 0.82),
+    (1.20, 0.05, 1.58, 1.70, 0.15, 0.55),
+    (0.20, -0.90, 0.38, 2.62, -1.15, 0.70),
+    (-1.40, -0.45, -1.85, 1.85, -0.70, 0.66),
+    (-1.75, 0.05, -2.32, 1.15, 0.20, 0.50),
+    (1.65, -0.45, 2.15, 1.80, -0.70, 0.62),
+    (1.95, 0.05, 2.50, 1.02, 0.25, 0.42),
+    (-0.50, 0.60, -0.66, 1.25, 0.85, 0.42),
+    (0.50, 0.62, 0.72, 0.98, 0.90, 0.36),
+    (-1.15, 0.55, -1.52, 0.98, 0.78, 0.38),
+    (1.20, 0.60, 1.48, 0.85, 0.85, 0.34),
 ]
 
 
@@ -40,7 +41,7 @@ class IceBody:
         rng = np.random.default_rng(seed)
         self.noise = Noise(seed)
         self.shards = [make_spire(rng, (x, 0.1, z), (tx, ty, tz), r) for x, z, tx, ty, tz, r in kShards]
-        self.shards += [self._splinter(rng) for _ in range(26)]
+        self.shards += [self._splinter(rng) for _ in range(30)]
         angles = np.linspace(0, 2 * np.pi, 11, endpoint=False) + rng.uniform(-0.2, 0.2, 11)
         reach = rng.uniform(0.86, 1.06, 11)
         self._walls = np.stack([angles, reach, rng.uniform(-0.1, 0.35, 11)], 1)
@@ -70,8 +71,9 @@ class IceBody:
         _, thickness = self._union(p)
         dust = np.clip((normals[:, 1] - 0.35 + 0.35 * self.noise.fractal(points, 0.35, 3, 70)) / 0.35, 0, 1)
         crack = np.zeros(len(points))
+        bent = _crumple(points)
         for k, (direction, offset) in enumerate(self._cracks):
-            side = self._crack_side(points, direction, offset, k)
+            side = bent @ direction - offset
             fan = np.clip(self.noise(points, 0.5, 60 + k) + 0.2, 0, 1)
             crack = np.maximum(crack, np.maximum(np.exp(-np.abs(side) / 0.012), fan * _one_sided(side, 0.14)))
         bubbles = np.clip(self._layer(p) * 1.3 - 0.1, 0, 1) * 0.45
@@ -80,42 +82,39 @@ class IceBody:
         white = 1.0 - (1.0 - 0.9 * dust) * (1.0 - 0.85 * crack) * (1.0 - bubbles) * (1.0 - thin) * (1.0 - mottle)
         return np.clip(white, 0.0, 1.0)
 
+    def layer(self, points: np.ndarray) -> np.ndarray:
+        """Which of the year's layers (N,), 0 (clear) .. 1 (full of bubbles)."""
+        return np.clip(0.5 + 0.5 * self._layer(self._bend(points)), 0.0, 1.0)
+
     def _bend(self, points: np.ndarray) -> np.ndarray:
-        return points + 0.075 * self.noise.vector(points, 0.95, 10) + 0.016 * self.noise.vector(points, 0.26, 20)
+        return points + 0.05 * swirl(points, 0.9) + 0.008 * swirl(points, 0.23, 1.0)
 
     def _union(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = self._block(p)
         thickness = np.full(len(p), 1.0)
-        low, high = p.min(0), p.max(0)
         for shard in self.shards:
+            # Far from a shard its box is a lower bound of its distance.
             a, b = bounds(shard)
-            gap = 2.0 * kBlend
-            if np.any(low > b + gap) or np.any(high < a - gap):
-                # Far from every point: its box is a lower bound of its distance.
-                box = np.linalg.norm(np.maximum(np.maximum(a - p, p - b), 0.0), axis=1)
-                np.minimum(d, box + 1e-3, out=d)
-                continue
-            near = np.all((p > a - gap) & (p < b + gap), axis=1)
-            box = np.linalg.norm(np.maximum(np.maximum(a - p[~near], p[~near] - b), 0.0), axis=1)
-            d[~near] = np.minimum(d[~near], box + 1e-3)
-            s, radius = distance(shard, p[near])
-            thickness[near] = np.where(s < d[near], radius, thickness[near])
-            d[near] = smooth_min(d[near], s, kBlend)
+            box = np.maximum(a - p, p - b).max(1)
+            near = np.flatnonzero(box < 2.0 * kBlend)
+            np.minimum(d, np.where(box < 2.0 * kBlend, np.inf, box), out=d)
+            if len(near):
+                s, radius = distance(shard, p[near])
+                thickness[near] = np.where(s < d[near], radius, thickness[near])
+                d[near] = smooth_min(d[near], s, kBlend)
         return d, thickness
 
     def _block(self, p: np.ndarray) -> np.ndarray:
-        # Two terraces of broken slabs.
+        # A broken slab.
         x, y, z = p.T
-        floor = 0.30 + 0.10 * self.noise(p * [1, 0, 1], 0.9, 30) + 0.05 * x * (x < 0)
-        d = np.maximum(y - floor, -0.30 - y)
-        upper = np.maximum(y - floor - 0.26, -y)
+        floor = 0.26 + 0.10 * swirl(p * [1, 0, 1], 0.9)[:, 1] + 0.04 * x - 0.06 * z
+        d = np.maximum(y - floor, -0.15 - y)
         for angle, reach, lean in self._walls:
             n = np.array([np.cos(angle), np.sin(angle)])
-            support = np.hypot(3.15 * n[0], 1.55 * n[1])
+            support = np.hypot(2.75 * n[0], 1.25 * n[1])
             out = (n[0] * x + n[1] * z - support * reach + lean * (y - 0.3)) / np.hypot(1.0, lean)
             d = np.maximum(d, out)
-            upper = np.maximum(upper, out + 0.55 + 0.25 * np.sin(7.0 * angle))
-        return smooth_min(d, upper, 0.04)
+        return d
 
     def _melt(self, points: np.ndarray, d: np.ndarray, thickness: np.ndarray) -> np.ndarray:
         # Nothing is cut far from the surface, and ever less towards the tips.
@@ -124,24 +123,21 @@ class IceBody:
         p, keep = points[near], np.clip(thickness[near] / 0.22, 0.0, 1.0)
         box = (kLower - 0.3, kUpper + 0.3)
         where = np.clip(0.5 + 1.2 * self.noise(p, 0.8, 40), 0.0, 1.0) * np.clip(1.5 - 0.45 * p[:, 1], 0.25, 1.0)
-        wavy = p + 0.03 * self.noise.vector(p, 0.2, 44)
-        cut = 0.034 * where * self.noise.scallops(wavy, (0.17, 0.30, 0.17), box, 1)
+        wavy = p + 0.02 * swirl(p, 0.25, 3.0)
+        cut = 0.03 * where * self.noise.scallops(wavy, (0.17, 0.30, 0.17), box, 1)
         cut += 0.010 * where * self.noise.scallops(wavy, (0.07, 0.09, 0.07), box, 2)
-        cut += 0.008 * self.noise.fractal(p, 0.13, 2, 46)
-        cut += 0.010 * np.clip(self._layer(p), -0.3, 1.0)
-        for k, (direction, offset) in enumerate(self._cracks):
-            cut += 0.02 * np.exp(-((self._crack_side(p, direction, offset, k) / 0.011) ** 2))
+        cut += 0.005 * self.noise.fractal(p, 0.15, 2, 46)
+        cut += 0.007 * np.clip(self._layer(p), -0.3, 1.0)
+        bent = _crumple(p)
+        for direction, offset in self._cracks:
+            cut += 0.016 * np.exp(-(((bent @ direction - offset) / 0.011) ** 2))
         result[near] = cut * keep
         return result
 
     def _layer(self, p: np.ndarray) -> np.ndarray:
         # Years of snow, tilted: noise along one axis only.
-        height = p @ np.array([0.22, 0.96, -0.15]) + 0.03 * self.noise(p, 0.8, 50)
-        line = np.stack([np.full_like(height, 3.3), height, np.full_like(height, 1.7)], 1)
-        return self.noise(line, 0.11, 52) + 0.5 * self.noise(line, 0.045, 53)
-
-    def _crack_side(self, p: np.ndarray, direction: np.ndarray, offset: float, k: int) -> np.ndarray:
-        return p @ direction - offset + 0.10 * self.noise(p, 0.6, 90 + k) + 0.012 * self.noise(p, 0.09, 100 + k)
+        height = p @ np.array([0.22, 0.96, -0.15]) + 0.02 * swirl(p, 0.7)[:, 0]
+        return 0.7 * self.noise.line(height, 0.10, 52) + 0.4 * self.noise.line(height, 0.04, 53)
 
     def _find_tips(self) -> np.ndarray:
         # The point that bending carries to each shard's tip, by fixed-point iteration; hidden tips are left out.
@@ -155,6 +151,10 @@ class IceBody:
 def _direction(rng: np.random.Generator) -> np.ndarray:
     n = rng.normal(size=3) * [1.0, 0.7, 0.6]
     return n / np.linalg.norm(n)
+
+
+def _crumple(points: np.ndarray) -> np.ndarray:
+    return points + 0.08 * swirl(points, 0.7, 0.5) + 0.012 * swirl(points, 0.11, 2.0)
 
 
 def _one_sided(side: np.ndarray, width: float) -> np.ndarray:

@@ -7,6 +7,7 @@ Not: band-limited to more than a factor of two; equal at points 32 features apar
 """
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
@@ -19,6 +20,7 @@ class Noise:
     def __init__(self, seed: int):
         self.seed = seed
         self._tiles: dict[int, np.ndarray] = {}
+        self._lines: dict[int, CubicSpline] = {}
         self._trees: dict[tuple, cKDTree] = {}
 
     def __call__(self, points: np.ndarray, size: float, stream: int = 0) -> np.ndarray:
@@ -37,6 +39,14 @@ class Noise:
         """Vectors (N, 3) of three independent noises."""
         return np.stack([self(points, size, stream + k) for k in range(3)], 1)
 
+    def line(self, height: np.ndarray, size: float, stream: int = 0) -> np.ndarray:
+        """Noise (N,) that depends on one coordinate alone."""
+        if stream not in self._lines:
+            rng = np.random.default_rng((self.seed, 104729, stream))
+            knots = rng.uniform(-1.0, 1.0, 256)
+            self._lines[stream] = CubicSpline(np.arange(257), np.append(knots, knots[0]), bc_type="periodic")
+        return self._lines[stream](np.mod(height / size, 256.0))
+
     def scallops(self, points: np.ndarray, size, box, stream: int = 0) -> np.ndarray:
         """Depth (N,) of bowls, 1 in their middle and 0 on the cusps between; `size` (3,), `box` = (lower, upper)."""
         size = np.broadcast_to(np.asarray(size, np.float64), 3)
@@ -49,6 +59,18 @@ class Noise:
             self._trees[key] = cKDTree(lattice + rng.uniform(0.0, 0.9, lattice.shape))
         distance, _ = self._trees[key].query(points / size, k=1, distance_upper_bound=1.5)
         return np.clip(1.0 - np.minimum(distance, 1.0) ** 2 / 0.55, 0.0, 1.0)
+
+
+def swirl(points: np.ndarray, size: float, phase: float = 0.0) -> np.ndarray:
+    """Cheap, slow vectors (N, 3) in about -1 .. 1: waves across each other, for bending space."""
+    q = points * (2.1 / size)
+    x, y, z = q.T
+    p = phase
+    return 0.55 * np.stack([
+        np.sin(y + 1.7 * np.sin(0.6 * z + p)) + np.sin(1.9 * z + 0.7 * y + 2.0 + p),
+        np.sin(x + 1.3 * np.sin(0.7 * y + p) + 4.0) + np.sin(1.7 * z + 0.5 * x + p),
+        np.sin(1.2 * y + 1.5 * np.sin(0.8 * x + p)) + np.sin(2.1 * x + 0.6 * y + 1.0 + p),
+    ], 1)  # fmt: skip
 
 
 def _turn(stream: int) -> np.ndarray:

@@ -31,15 +31,18 @@ def make_spire(rng: np.random.Generator, base, tip, radius: float, **fixed) -> S
     base, tip = np.asarray(base, np.float64), np.asarray(tip, np.float64)
     count = int(rng.integers(4, 7))
     angles = (np.arange(count) + rng.uniform(-0.28, 0.28, count)) * 2.0 * np.pi / count + rng.uniform(0, 6.28)
-    faces = np.stack([
-        angles,
-        rng.uniform(0.05, 0.24, count),
-        rng.uniform(0.16, 0.36, count),
-        rng.choice([0.0, 0.03, 0.055], count),
-        rng.uniform(0, 1, count),
-    ], 1)
+    faces = np.stack(
+        [
+            angles,
+            rng.uniform(0.05, 0.24, count),
+            rng.uniform(0.16, 0.36, count),
+            rng.choice([0.0, 0.03, 0.055], count),
+            rng.uniform(0, 1, count),
+        ],
+        1,
+    )
     knots = np.concatenate([[0.0], np.sort(rng.uniform(0.12, 0.85, 4)), [1.0]])
-    offsets = rng.uniform(0.62, 1.02, (count, 1)) + rng.uniform(-0.2, 0.16, (count, len(knots)))
+    offsets = rng.uniform(0.66, 0.95, (count, 1)) + rng.uniform(-0.16, 0.30, (count, len(knots)))
     length = np.linalg.norm(tip - base)
     values = dict(
         faces=faces,
