@@ -39,8 +39,8 @@ def build(path: Path, detail: float, seed: int) -> None:
 
     snow = contour(Snow(ice), kLower, kUpper, 1.25 * cell)
     writer.add_mesh("Snow", snow, corner_normals(snow, 80.0))
-    for name, center, size in (("RockLeft", (-1.32, 0.30, 0.98), (0.42, 0.30, 0.34)),
-                               ("RockRight", (2.15, 0.10, 1.22), (0.50, 0.36, 0.42))):  # fmt: skip
+    for name, center, size in (("RockLeft", (-1.62, 0.34, 1.00), (0.44, 0.36, 0.36)),
+                               ("RockRight", (2.12, 0.14, 1.08), (0.50, 0.40, 0.44))):  # fmt: skip
         rock = Rock(center, size, seed + len(name))
         stone = contour(rock, *rock.bounds(), cell)
         writer.add_mesh(

@@ -11,26 +11,26 @@ import numpy as np
 from noise import Noise, swirl
 from spires import Spire, bounds, distance, make_spire, smooth_min
 
-kLower = np.array([-3.5, -0.3, -2.2])
-kUpper = np.array([3.5, 3.4, 1.9])
+kLower = np.array([-4.2, -0.4, -3.0])
+kUpper = np.array([4.2, 3.7, 2.6])
 kBlend = 0.05  # metres over which shards grow together
 
 # base x, z; tip x, y, z; radius at the base.
 kShards = [
-    (-0.45, -0.20, -0.35, 3.05, -0.50, 1.05),
-    (-0.95, 0.10, -1.18, 2.15, 0.05, 0.62),
-    (0.05, 0.25, 0.22, 1.75, 0.45, 0.52),
-    (0.70, -0.35, 1.05, 2.50, -0.60, 0.82),
-    (1.20, 0.05, 1.58, 1.70, 0.15, 0.55),
-    (0.20, -0.90, 0.38, 2.62, -1.15, 0.70),
-    (-1.40, -0.45, -1.85, 1.85, -0.70, 0.66),
-    (-1.75, 0.05, -2.32, 1.15, 0.20, 0.50),
-    (1.65, -0.45, 2.15, 1.80, -0.70, 0.62),
-    (1.95, 0.05, 2.50, 1.02, 0.25, 0.42),
-    (-0.50, 0.60, -0.66, 1.25, 0.85, 0.42),
-    (0.50, 0.62, 0.72, 0.98, 0.90, 0.36),
-    (-1.15, 0.55, -1.52, 0.98, 0.78, 0.38),
-    (1.20, 0.60, 1.48, 0.85, 0.85, 0.34),
+    (-0.55, -0.20, -0.36, 3.15, -0.45, 1.00),
+    (-0.02, -0.35, 0.24, 2.52, -0.60, 0.74),
+    (-1.02, 0.05, -1.24, 2.22, 0.00, 0.68),
+    (-0.28, 0.35, -0.10, 1.72, 0.52, 0.52),
+    (-1.40, -0.40, -1.92, 1.75, -0.60, 0.62),
+    (1.15, -0.30, 1.46, 2.32, -0.45, 0.76),
+    (0.82, 0.18, 0.80, 1.45, 0.38, 0.46),
+    (1.62, 0.05, 2.04, 1.50, 0.15, 0.52),
+    (0.62, -0.85, 0.74, 1.95, -1.15, 0.62),
+    (-1.85, 0.10, -2.48, 1.08, 0.25, 0.46),
+    (2.00, -0.30, 2.66, 1.28, -0.42, 0.52),
+    (-0.95, 0.62, -1.18, 1.02, 0.88, 0.38),
+    (0.28, 0.62, 0.42, 0.98, 0.88, 0.36),
+    (1.40, 0.58, 1.64, 0.82, 0.82, 0.32),
 ]
 
 
@@ -41,16 +41,16 @@ class IceBody:
         rng = np.random.default_rng(seed)
         self.noise = Noise(seed)
         self.shards = [make_spire(rng, (x, 0.1, z), (tx, ty, tz), r) for x, z, tx, ty, tz, r in kShards]
-        self.shards += [self._splinter(rng) for _ in range(30)]
+        self.shards += [self._splinter(rng) for _ in range(44)]
         angles = np.linspace(0, 2 * np.pi, 11, endpoint=False) + rng.uniform(-0.2, 0.2, 11)
         reach = rng.uniform(0.86, 1.06, 11)
-        self._walls = np.stack([angles, reach, rng.uniform(-0.1, 0.35, 11)], 1)
+        self._walls = np.stack([angles, reach, rng.uniform(-0.15, 0.22, 11)], 1)
         self._cracks = [(_direction(rng), rng.uniform(-1.2, 1.2)) for _ in range(7)]
         self.tips = self._find_tips()
 
     def _splinter(self, rng: np.random.Generator) -> Spire:
         # A small shard that leans away from a large one.
-        parent = self.shards[rng.integers(0, 9)]
+        parent = self.shards[rng.integers(0, 11)]
         turn = rng.uniform(0, 2 * np.pi)
         out = np.array([np.cos(turn), 0.0, np.sin(turn)])
         at = parent.base + out * parent.radius * rng.uniform(0.5, 0.95)
@@ -76,7 +76,7 @@ class IceBody:
             side = bent @ direction - offset
             fan = np.clip(self.noise(points, 0.5, 60 + k) + 0.2, 0, 1)
             crack = np.maximum(crack, np.maximum(np.exp(-np.abs(side) / 0.012), fan * _one_sided(side, 0.14)))
-        bubbles = np.clip(self._layer(p) * 1.3 - 0.1, 0, 1) * 0.45
+        bubbles = np.clip(self._layer(p) * 1.3 - 0.2, 0, 1) * np.clip(0.35 + self.noise(p, 0.7, 85), 0, 1) * 0.5
         thin = np.clip(1.0 - thickness / 0.10, 0, 1) * 0.55
         mottle = np.clip(self.noise.fractal(points, 0.5, 4, 80) - 0.1, 0, 1) * 0.5
         white = 1.0 - (1.0 - 0.9 * dust) * (1.0 - 0.85 * crack) * (1.0 - bubbles) * (1.0 - thin) * (1.0 - mottle)
@@ -102,12 +102,12 @@ class IceBody:
                 s, radius = distance(shard, p[near])
                 thickness[near] = np.where(s < d[near], radius, thickness[near])
                 d[near] = smooth_min(d[near], s, kBlend)
-        return d, thickness
+        return np.maximum(d, -0.15 - p[:, 1]), thickness
 
     def _block(self, p: np.ndarray) -> np.ndarray:
         # A broken slab.
         x, y, z = p.T
-        floor = 0.26 + 0.10 * swirl(p * [1, 0, 1], 0.9)[:, 1] + 0.04 * x - 0.06 * z
+        floor = 0.36 + 0.08 * swirl(p * [1, 0, 1], 0.9)[:, 1] + 0.03 * x - 0.05 * z
         d = np.maximum(y - floor, -0.15 - y)
         for angle, reach, lean in self._walls:
             n = np.array([np.cos(angle), np.sin(angle)])

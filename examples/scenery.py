@@ -21,9 +21,9 @@ class Rock:
     def __init__(self, center, size, seed: int):
         rng = np.random.default_rng((seed, 17))
         self.center, self.size = np.asarray(center, float), np.asarray(size, float)
-        normals = rng.normal(size=(22, 3))
+        normals = rng.normal(size=(15, 3))
         self._normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        self._reach = rng.uniform(0.68, 1.0, 22)
+        self._reach = rng.uniform(0.5, 0.86, 15)
         self._noise = Noise(seed + 1000)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -55,7 +55,7 @@ class Snow:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         patch = 0.75 + 0.45 * self._ice.noise(points, 0.42, 110)
-        high = np.clip(1.25 - 0.28 * points[:, 1], 0.45, 1.2)
+        high = np.clip(1.25 - 0.30 * points[:, 1], 0.35, 1.2)
         depth = self._depth * np.clip(patch, 0.15, 1.2) * high
         lifted = points - depth[:, None] * [0.0, 1.0, 0.0]
         snow = self._ice(lifted) + 0.5 * self._depth
@@ -74,7 +74,7 @@ def make_snowfield(ice: IceBody, extent: float, count: int, seed: int) -> Surfac
     height += 0.006 * noise(p * [0.7, 1.0, 2.6], 0.12, 2) + 0.5 * noise(p, 14.0, 3) * np.clip(far / 15.0 - 0.5, 0, 1)
     # Drifts lean against the ice.
     height += 0.14 * np.exp(-np.maximum(ice(p + [0.0, 0.1, 0.0]), 0.0) / 0.28)
-    p[:, 1] = height - 0.06
+    p[:, 1] = height - 0.09
     row = 2 * count + 1
     a = (np.arange(2 * count)[:, None] * row + np.arange(2 * count)).ravel()
     triangles = np.concatenate([np.stack([a, a + row, a + 1], 1), np.stack([a + 1, a + row, a + row + 1], 1)])

@@ -48,8 +48,8 @@ def make_spire(rng: np.random.Generator, base, tip, radius: float, **fixed) -> S
         faces=faces,
         knots=knots,
         offsets=offsets,
-        twist=rng.uniform(-0.55, 0.55),
-        bend=rng.uniform(-0.05, 0.05, 3) * length * [1, 0, 1],
+        twist=rng.uniform(-0.7, 0.7),
+        bend=rng.uniform(-0.06, 0.06, 3) * length * [1, 0, 1],
         power=rng.uniform(0.95, 1.25),
     )
     return Spire(base, tip, radius, **(values | fixed))

@@ -8,7 +8,7 @@ Not: animation, instances.
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
 from dual_contouring import Surface
 from sky import write_image
@@ -68,7 +68,9 @@ class SceneWriter:
         write_image(self._beside("_tint.exr"), tint)
         write_image(self._beside("_roughness.exr"), roughness)
 
-        stage = Usd.Stage.CreateInMemory()
+        # Relative references resolve against the layer's own file: write it beside its goal and rename it.
+        partial = self._path.with_name(self._path.stem + "_partial.usda")
+        stage = _create(partial)
         _set_units(stage)
         stage.GetRootLayer().customLayerData = {kStampKey: stamp}
         world = UsdGeom.Xform.Define(stage, "/World")
@@ -81,7 +83,8 @@ class SceneWriter:
             UsdShade.MaterialBindingAPI.Apply(mesh).Bind(materials[name.removesuffix("Left").removesuffix("Right")])
         self._add_lights(stage, sun)
         self._add_camera(stage)
-        _export(stage, self._path)
+        _export(stage, partial)
+        partial.replace(self._path)
 
     def _beside(self, ending: str) -> Path:
         return self._path.with_name(self._path.stem + ending)
@@ -147,11 +150,11 @@ class SceneWriter:
 
     def _add_camera(self, stage: Usd.Stage) -> None:
         camera = UsdGeom.Camera.Define(stage, "/World/Camera")
-        camera.CreateFocalLengthAttr(42.0)
+        camera.CreateFocalLengthAttr(40.0)
         camera.CreateHorizontalApertureAttr(36.0)
         camera.CreateVerticalApertureAttr(20.25)
         camera.CreateClippingRangeAttr(Gf.Vec2f(0.1, 1000.0))
-        eye, to = np.array([1.15, 0.62, 6.9]), np.array([0.05, 1.36, 0.0])
+        eye, to = np.array([1.05, 0.50, 6.2]), np.array([0.06, 1.40, 0.0])
         camera.AddTransformOp().Set(_frame(eye - to, eye))
 
 
@@ -195,10 +198,19 @@ def _set_units(stage: Usd.Stage) -> None:
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
 
 
+def _create(path: Path) -> Usd.Stage:
+    path.unlink(missing_ok=True)
+    try:
+        return Usd.Stage.CreateNew(str(path))
+    except Tf.ErrorException as error:
+        raise OSError(f"{path}: cannot be written: {error}") from error
+
+
 def _export(stage: Usd.Stage, path: Path) -> None:
     try:
-        done = stage.GetRootLayer().Export(str(path))
-    except Exception as error:  # pxr raises its own ErrorException
+        layer = stage.GetRootLayer()
+        done = layer.Save() if layer.realPath == str(path.resolve()) else layer.Export(str(path))
+    except Tf.ErrorException as error:
         raise OSError(f"{path}: cannot be written: {error}") from error
     if not done:
         raise OSError(f"{path}: cannot be written.")
