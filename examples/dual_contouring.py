@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 Field = Callable[[np.ndarray], np.ndarray]
 
-kLipschitz = 1.5  # how steep a field may be before a block that it crosses can be overlooked
+kLipschitz = 1.3  # how steep a field may be before a block that it crosses can be overlooked
 kBlock, kSubBlock = 12, 2  # cells along the edge of a block that is skipped as a whole where the field is large
 kRegularization = 0.03  # pull of a cell's vertex towards the mean of its crossings
 kChunk = 1 << 15  # points per call of the field

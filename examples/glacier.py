@@ -37,10 +37,10 @@ def build(path: Path, detail: float, seed: int) -> None:
     frost = ice.frost(surface.positions, vertex_normals)
     writer.add_mesh("Ice", surface, normals, st=np.stack([frost, ice.layer(surface.positions)], 1))
 
-    snow = contour(Snow(ice), kLower, kUpper, 1.25 * cell)
+    snow = contour(Snow(ice), kLower, kUpper, 1.5 * cell)
     writer.add_mesh("Snow", snow, corner_normals(snow, 80.0))
-    for name, center, size in (("RockLeft", (-1.62, 0.34, 1.00), (0.44, 0.36, 0.36)),
-                               ("RockRight", (2.12, 0.14, 1.08), (0.50, 0.40, 0.44))):  # fmt: skip
+    for name, center, size in (("RockLeft", (-1.52, 0.34, 0.80), (0.36, 0.30, 0.30)),
+                               ("RockRight", (2.02, 0.16, 0.92), (0.42, 0.34, 0.36))):  # fmt: skip
         rock = Rock(center, size, seed + len(name))
         stone = contour(rock, *rock.bounds(), cell)
         writer.add_mesh(

@@ -92,9 +92,14 @@ class IceBody:
     def _union(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = self._block(p)
         thickness = np.full(len(p), 1.0)
+        low, high = p.min(0), p.max(0)
         for shard in self.shards:
             # Far from a shard its box is a lower bound of its distance.
             a, b = bounds(shard)
+            gap = np.maximum(a - high, low - b).max()
+            if gap > 0.3:
+                np.minimum(d, gap, out=d)
+                continue
             box = np.maximum(a - p, p - b).max(1)
             near = np.flatnonzero(box < 2.0 * kBlend)
             np.minimum(d, np.where(box < 2.0 * kBlend, np.inf, box), out=d)

@@ -36,7 +36,7 @@ class Rock:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """A box that holds the rock."""
-        return self.center - 1.25 * self.size - 0.03, self.center + 1.25 * self.size + 0.03
+        return self.center - 1.25 * self.size - 0.06, self.center + 1.25 * self.size + 0.06
 
     def color(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Albedo (N, 3): grey-brown stone in bands, rime on what faces up."""
@@ -54,12 +54,17 @@ class Snow:
         self._ice, self._depth = ice, depth
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        patch = 0.75 + 0.45 * self._ice.noise(points, 0.42, 110)
-        high = np.clip(1.25 - 0.30 * points[:, 1], 0.35, 1.2)
+        ice = self._ice(points)
+        # Snow can only be near the surface: elsewhere a bound does.
+        result = np.maximum(ice - 1.2 * self._depth, -(ice + kSnowRoot))
+        near = np.flatnonzero((ice > -kSnowRoot - 0.03) & (ice < 3.0 * self._depth))
+        p = points[near]
+        patch = 0.75 + 0.45 * self._ice.noise(p, 0.42, 110)
+        high = np.clip(1.25 - 0.30 * p[:, 1], 0.35, 1.2)
         depth = self._depth * np.clip(patch, 0.15, 1.2) * high
-        lifted = points - depth[:, None] * [0.0, 1.0, 0.0]
-        snow = self._ice(lifted) + 0.5 * self._depth
-        return np.maximum(snow, -(self._ice(points) + kSnowRoot))
+        snow = self._ice(p - depth[:, None] * [0.0, 1.0, 0.0]) + 0.5 * self._depth
+        result[near] = np.maximum(snow, -(ice[near] + kSnowRoot))
+        return result
 
 
 def make_snowfield(ice: IceBody, extent: float, count: int, seed: int) -> Surface:

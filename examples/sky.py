@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from noise import Noise
+from noise import Noise, swirl
 
 kZenith = np.array([0.10, 0.22, 0.46])
 kHorizon = np.array([0.80, 0.92, 1.04])
@@ -52,7 +52,7 @@ def _add_clouds(sky, direction, toward_sun, noise: Noise):
     d = direction[above]
     # A layer overhead, stretched along the wind.
     plane = d / (d[:, 1:2] + 0.10) * [0.55, 0.0, 1.0]
-    shape = noise.fractal(plane + 0.25 * noise.vector(plane, 1.6, 30), 1.5, 5, 0, 0.55)
+    shape = noise.fractal(plane + 0.25 * swirl(plane, 1.6), 1.5, 5, 0, 0.55)
     cover = np.clip((shape + 0.02) / 0.55, 0.0, 1.0)
     cover = cover * cover * (3.0 - 2.0 * cover) * np.clip(d[:, 1] / 0.05, 0.0, 1.0)
     lining = np.exp(-(1.0 - toward_sun[above]) / 0.25) * (1.0 - cover) * 1.6
