@@ -13,13 +13,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 Field = Callable[[np.ndarray], np.ndarray]
 
 kLipschitz = 1.3  # how steep a field may be before a block that it crosses can be overlooked
 kBlock, kSubBlock = 12, 2  # cells along the edge of a block that is skipped as a whole where the field is large
-kRegularization = 0.03  # pull of a cell's vertex towards the mean of its crossings
+kRegularization = 0.005  # pull of a cell's vertex towards the mean of its crossings
+kSharp = 0.7  # share of a full turn that the angles around a tip may have
 kChunk = 1 << 15  # points per call of the field
 
 
@@ -35,11 +38,23 @@ class Surface:
         a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
         return _normalized(_sum_at(self.triangles, np.repeat(np.cross(b - a, c - a), 3, 0), len(self.positions)))
 
+    def largest_piece(self) -> "Surface":
+        """The connected piece with the most triangles: without the crumbs where thin tips slip through the grid."""
+        links = coo_matrix((np.ones(len(self.triangles)), (self.triangles[:, 0], self.triangles[:, 1])))
+        links.resize((len(self.positions),) * 2)
+        _, piece = connected_components(links, directed=False)
+        kept = piece == np.bincount(piece[self.triangles[:, 0]]).argmax()
+        return Surface(self.positions[kept], (np.cumsum(kept) - 1)[self.triangles[kept[self.triangles[:, 0]]]])
+
     def sharpen(self, tips: np.ndarray, reach: float) -> None:
-        """Pull the vertex nearest to each of the tips (K, 3) onto it, where there is one within `reach`."""
+        """Pull the vertex nearest to each of the tips (K, 3) onto it, where that is within `reach` and makes a tip."""
         distance, nearest = cKDTree(self.positions).query(tips)
-        near = distance < reach
-        self.positions[nearest[near]] = tips[near]
+        for vertex, tip in zip(nearest[distance < reach], tips[distance < reach], strict=True):
+            fan = self.triangles[(self.triangles == vertex).any(1)]
+            ends = self.positions[fan[fan != vertex].reshape(-1, 2)] - tip
+            ends /= np.linalg.norm(ends, axis=2, keepdims=True)
+            if np.arccos(np.clip(np.sum(ends[:, 0] * ends[:, 1], 1), -1.0, 1.0)).sum() < kSharp * 2.0 * np.pi:
+                self.positions[vertex] = tip
 
 
 def contour(field: Field, lower, upper, cell: float) -> Surface:
