@@ -72,13 +72,8 @@ def contour(field: Field, lower, upper, cell: float) -> Surface:
     if not inside.any() or _touches_border(inside):
         raise ValueError(f"field: surface must lie inside the box {lower.tolist()} .. {list(upper)}. Enlarge the box.")
     crossings = [_crossings(values, inside, axis) for axis in range(3)]
-
-    points, normals = [], []
-    for axis, (base, start, _) in enumerate(crossings):
-        p = lower + cell * (base + start[:, None] * np.eye(3)[axis])
-        n = _gradients(field, p, 0.12 * cell)
-        points.append(p)
-        normals.append(n)
+    points = [_refined(field, lower, cell, axis, *crossing) for axis, crossing in enumerate(crossings)]
+    normals = [_gradients(field, p, 0.05 * cell) for p in points]
     return _connect(crossings, points, normals, lower, cell, np.array(inside.shape))
 
 
@@ -142,16 +137,37 @@ def _touches_border(inside: np.ndarray) -> bool:
 
 
 def _crossings(values: np.ndarray, inside: np.ndarray, axis: int):
-    # Grid edges along the axis whose ends differ: lower end (N, 3), fraction along the edge, whether it enters.
+    # Grid edges along the axis whose ends differ: lower end (N, 3), the values at both ends, whether it leaves.
     lo = [slice(None)] * 3
     hi = [slice(None)] * 3
     lo[axis], hi[axis] = slice(None, -1), slice(1, None)
     base = np.argwhere(inside[tuple(lo)] != inside[tuple(hi)])
     end = base + np.eye(3, dtype=int)[axis]
-    a = values[tuple(base.T)].astype(np.float64)
-    b = values[tuple(end.T)].astype(np.float64)
-    fraction = np.where((a < 0) != (b < 0), a / np.where(a == b, 1.0, a - b), 0.5)
-    return base, np.clip(fraction, 0.0, 1.0), inside[tuple(base.T)]
+    return (
+        base,
+        values[tuple(base.T)].astype(np.float64),
+        values[tuple(end.T)].astype(np.float64),
+        inside[tuple(base.T)],
+    )
+
+
+def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray:
+    # The crossing of each edge by two steps of false position; the middle where filling made it up.
+    start, along = lower + cell * base, cell * np.eye(3)[axis]
+    s, t = np.zeros(len(a)), np.ones(len(a))
+    made_up = (a < 0) == (b < 0)
+
+    def point():
+        middle = np.where(made_up, 0.5, s + (t - s) * a / np.where(a == b, 1.0, a - b))
+        return middle, start + middle[:, None] * along
+
+    for _ in range(2):
+        middle, p = point()
+        value = evaluate(field, p)
+        first = (value < 0) == (a < 0)
+        s, a = np.where(first, middle, s), np.where(first, value, a)
+        t, b = np.where(first, t, middle), np.where(first, b, value)
+    return point()[1]
 
 
 def _gradients(field: Field, points: np.ndarray, step: float) -> np.ndarray:
@@ -163,7 +179,7 @@ def _gradients(field: Field, points: np.ndarray, step: float) -> np.ndarray:
 def _connect(crossings, points, normals, lower, cell, shape) -> Surface:
     # Gather the four cells around each crossed edge.
     rings = []
-    for axis, (base, _, _) in enumerate(crossings):
+    for axis, (base, *_) in enumerate(crossings):
         a, b = np.eye(3, dtype=int)[(axis + 1) % 3], np.eye(3, dtype=int)[(axis + 2) % 3]
         cells = np.stack([base - a - b, base - b, base, base - a], 1)
         rings.append(np.ravel_multi_index(np.moveaxis(cells, -1, 0), shape))
@@ -186,7 +202,7 @@ def _connect(crossings, points, normals, lower, cell, shape) -> Surface:
     positions = np.clip(positions, corner, corner + cell)
 
     # Split each quad along the diagonal whose two triangles agree better with the field's own normal.
-    entering = np.concatenate([c[2] for c in crossings])
+    entering = np.concatenate([c[3] for c in crossings])
     quad = np.where(entering[:, None], ring, ring[:, ::-1])
     first = np.stack([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]], 1)
     second = np.stack([quad[:, [1, 2, 3]], quad[:, [1, 3, 0]]], 1)

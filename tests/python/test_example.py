@@ -165,8 +165,8 @@ def test_a_box_meets_its_corners(example_modules):
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
     surface = contour(lambda p: (np.abs(p @ turn) - half).max(1), [-0.6] * 3, [0.6] * 3, 0.03)
     corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T * half @ turn.T
-    for corner in corners:
-        assert np.linalg.norm(surface.positions - corner, axis=1).min() < 0.003
+    miss = [np.linalg.norm(surface.positions - corner, axis=1).min() for corner in corners]
+    assert max(miss) < 0.008  # of cells of 0.03; marching cubes would miss by about 0.015
     a, b, c = (surface.positions[surface.triangles[:, k]] for k in range(3))
     assert np.sum(a * np.cross(b, c)) / 6.0 == pytest.approx(8 * half.prod(), rel=0.004)
 
