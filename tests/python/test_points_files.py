@@ -57,7 +57,8 @@ def test_usd_points(tmp_path):
         result = run(path, "-o", tmp_path / "p.usda", "--spacing", 0.3, "--quiet")
         assert result.exit_code == 0, result.output
     expected = fz.poisson_points(read_mesh(path), 0.3)
-    prim = geom.Points(usd.Stage.Open(str(tmp_path / "p.usda")).GetPrimAtPath("/Points"))
+    stage = usd.Stage.Open(str(tmp_path / "p.usda"))
+    prim = geom.Points(stage.GetPrimAtPath("/Points"))
     np.testing.assert_array_equal(np.array(prim.GetPointsAttr().Get()), expected.positions)
     areas = geom.PrimvarsAPI(prim).GetPrimvar("frazil:area").Get()
     np.testing.assert_array_equal(np.array(areas), expected.areas)

@@ -164,5 +164,5 @@ def test_poisson_is_more_even_than_tessellated():
     mesh = fz.Mesh(positions, triangles)
     poisson = fz.point_statistics(fz.poisson_points(mesh, 0.05), mesh)
     regular = fz.point_statistics(fz.tessellated_points(mesh, 0.05), mesh)
-    assert poisson.area_spread < 0.5 * regular.area_spread
+    assert poisson.area_spread < 0.6 * regular.area_spread
     assert poisson.distance_spread < 0.5 * regular.distance_spread

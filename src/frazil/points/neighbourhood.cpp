@@ -10,7 +10,7 @@ void Neighbourhood::reset(double size, double cell, double reach, float least_co
     scale_ = 1.0f / width_;
     reach_ = static_cast<float>(reach);
     least_cosine_ = least_cosine;
-    marked_.assign(cells_ * cells_ * cells_, 0);
+    marked_.assign(cells_ * cells_, 0);
     heads_.assign(cells_ * cells_ * cells_, -1);
     chunks_.clear();
     locals.clear();
@@ -28,7 +28,7 @@ void Neighbourhood::mark(const V3f& low, const V3f& high) {
     }
     for (int z = from[2]; z <= to[2]; ++z) {
         for (int y = from[1]; y <= to[1]; ++y) {
-            for (int x = from[0]; x <= to[0]; ++x) marked_[(z * cells_ + y) * cells_ + x] = 1;
+            marked_[z * cells_ + y] |= (2u << to[0]) - (1u << from[0]);
         }
     }
 }
@@ -59,10 +59,12 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
     for (int z = from[2]; z <= to[2]; ++z) {
         const float dz = gap(z, 2);
         for (int y = from[1]; y <= to[1]; ++y) {
+            std::uint32_t row = marked_[z * cells_ + y] & ((2u << to[0]) - (1u << from[0]));
+            if (row == 0) continue;
             const float dy = gap(y, 1);
-            for (int x = from[0]; x <= to[0]; ++x) {
+            for (; row != 0; row &= row - 1) {
+                const int x = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(row));
                 const std::size_t cell = (z * cells_ + y) * cells_ + x;
-                if (!marked_[cell]) continue;
                 const float dx = gap(x, 0);
                 if (dx * dx + dy * dy + dz * dz > reach2) continue;
                 if (heads_[cell] < 0 || chunks_[heads_[cell]].count == int(kLanes)) {

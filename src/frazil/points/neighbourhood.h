@@ -83,7 +83,7 @@ class Neighbourhood {
     float width_ = 1.0f;
     float reach_ = 1.0f;
     float least_cosine_ = 0.0f;
-    std::vector<std::uint8_t> marked_;
+    std::vector<std::uint32_t> marked_;  // a bit per cell along x, a word per row
     std::vector<std::int32_t> heads_;
     std::vector<Chunk> chunks_;
 };

@@ -16,7 +16,7 @@
 namespace frazil {
 namespace {
 
-constexpr double kTileWidth = 8.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
+constexpr double kTileWidth = 12.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
 constexpr std::size_t kTriangleGrain = 4096;
 
 // The area, and the integral of 1 / spacing² over it, which tells the number of points.
@@ -72,7 +72,7 @@ PointSet assemble(const Mesh& mesh, std::vector<std::vector<Dart>>& darts, std::
 // Points in their tiles, before areas and arrays are made of them.
 struct Placed {
     SpacingField spacing;
-    double unit, largest;  // the reference spacing, and the largest one in that unit
+    double unit;  // the reference spacing
     TileGrid grid;
     std::vector<std::vector<Dart>> darts;
 
@@ -125,7 +125,7 @@ Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, cons
                 for (const std::uint32_t other : grid.neighbours(tile)) around.push_back(&darts[other]);
                 placed.clear();
                 filler.fill({grid.tile_origin(tile), unit, grid.size / unit}, &grid.triangles[grid.starts[tile]],
-                            grid.starts[tile + 1] - grid.starts[tile], around, grid.keys[tile], largest / unit, placed);
+                            grid.starts[tile + 1] - grid.starts[tile], around, grid.keys[tile], placed);
                 darts[tile] = std::vector<Dart>(placed);
             }
             if (progress) progress->update("points", double(done += end - begin) / double(grid.count()));
@@ -133,11 +133,11 @@ Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, cons
     }
     fillers.clear();
 
-    return {spacing, unit, largest / unit, std::move(grid), std::move(darts)};
+    return {spacing, unit, std::move(grid), std::move(darts)};
 }
 
 PointSet finish(const Mesh& mesh, Placed& placed, double spacing, bool thin_walls, Progress* progress) {
-    std::vector<float> areas = nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, placed.largest, thin_walls,
+    std::vector<float> areas = nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls,
                                              placed.darts, progress);
     PointSet points = assemble(mesh, placed.darts, std::move(areas));
     points.spacing = spacing;
