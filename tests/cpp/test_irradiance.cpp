@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "frazil/base/parallel.h"
+#include "frazil/lighting/bounce.h"
 #include "frazil/lighting/irradiance.h"
 
 using namespace frazil;
@@ -315,11 +316,75 @@ TEST_CASE("irradiance: bad options and points are refused") {
     IrradianceOptions options;
     options.samples = 0;
     CHECK_THROWS_WITH_AS(bake_irradiance(PointSet(), empty, none, full, options),
-                         doctest::Contains("samples must be >= 1, got 0"), ValueError);
+                         doctest::Contains("samples must be in [1, 2^20], got 0"), ValueError);
     PointSet points;
     points.positions = {V3f(0.0f)};
     CHECK_THROWS_WITH_AS(bake_irradiance(points, empty, none, full), doctest::Contains("normals must be one per point"),
                          ValueError);
     points.normals = {V3f(0, 0, 1)};
     CHECK(bake_irradiance(points, empty, none, full).values == std::vector<Rgb>{Rgb(0.0f)});
+}
+
+namespace {
+
+Mesh box(float s) {
+    Mesh mesh;
+    for (int i = 0; i < 8; ++i) mesh.positions.emplace_back(i & 1 ? s : -s, i & 2 ? s : -s, i & 4 ? s : -s);
+    mesh.triangles = {{0, 1, 3}, {0, 3, 2}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                      {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 3, 7}, {1, 7, 5}};
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("bounce: walls of radiance 1 all around give pi, per group, and T weighs the entry") {
+    const RayScene scene({box(1.0f)}, {{0, M44f()}});
+    const PointSet points = grid_of_points(3);
+    const BounceRadiance walls = [](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+            const V3f p(std::abs(hits[i].position.x), std::abs(hits[i].position.y), std::abs(hits[i].position.z));
+            CHECK_UNARY(max_component(p) == doctest::Approx(1.0));
+            radiance[2 * i] = Rgb(1.0f), radiance[2 * i + 1] = Rgb(-3.0f);
+        }
+    };
+    const auto bounced = bake_bounce(points, scene, 2, walls, full);
+    REQUIRE(bounced.values.size() == 18);
+    CHECK(bounced.values[8].x == doctest::Approx(kPiD).epsilon(1e-5));
+    CHECK(bounced.values[9].x == doctest::Approx(-3 * kPiD).epsilon(1e-5));
+    const auto weighed = bake_bounce(points, scene, 2, walls, [](float c) { return c; }, {1024});
+    CHECK(weighed.values[0].x == doctest::Approx(2 * kPiD / 3).epsilon(1e-3));
+    CHECK_THROWS_WITH_AS(bake_bounce(points, scene, 1, walls, full, {0}), doctest::Contains("samples"), ValueError);
+}
+
+TEST_CASE("bounce: a wall above wide snow under a uniform sky receives albedo pi / 2 from below") {
+    const RayScene scene({square(1000.0f, 0.0f)}, {{0, M44f()}});
+    const LightSampler sky({make_light(DomeLight{})});
+    const PointSet wall = one_point(V3f(0, 0, 1), V3f(1, 0, 0));
+    const auto snow = reflected_light(scene, sky, [](const BounceHit&) { return Rgb(0.8f, 0.5f, 0.0f); });
+    const auto bounced = bake_bounce(wall, scene, 1, snow, full, {4096});
+    CHECK(bounced.values[0].x == doctest::Approx(0.8 * kPiD / 2).epsilon(5e-3));
+    CHECK(bounced.values[0].y == doctest::Approx(0.5 * kPiD / 2).epsilon(5e-3));
+    CHECK(bounced.values[0].z == 0.0f);
+    // A light told not to act on diffuse surfaces does not come back from them.
+    Light off = make_light(DomeLight{});
+    off.multipliers[int(LightComponent::diffuse)] = 0.0f;
+    const LightSampler none({off});
+    const auto dark = reflected_light(scene, none, [](const BounceHit&) { return Rgb(0.8f); });
+    CHECK(bake_bounce(wall, scene, 1, dark, full, {64}).values[0] == Rgb(0.0f));
+}
+
+TEST_CASE("bounce: the same bits for one thread and two") {
+    const RayScene scene({square(5.0f, -0.5f), square(0.3f, 0.4f)}, {{0, M44f()}, {1, M44f()}});
+    const LightSampler sky({make_light(DomeLight{}), make_light(SphereLight{}, translated({2, 0, 1}))});
+    PointSet points = grid_of_points(20);
+    for (V3f& normal : points.normals) normal = -normal;
+    const auto bake = [&](int threads) {
+        return with_threads(threads, [&] {
+            return bake_bounce(points, scene, 1,
+                               reflected_light(scene, sky, [](const BounceHit&) { return Rgb(0.7f); }), full, {16});
+        });
+    };
+    const auto one = bake(1), two = bake(2);
+    CHECK(one.values == two.values);
+    CHECK(one.values[30].x > 0.0f);
 }

@@ -109,6 +109,9 @@ def test_broken_creases_are_named(stage):
     [
         Gf.Matrix4d(1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1),
         Gf.Matrix4d(float("nan")),
+        Gf.Matrix4d(1).SetScale(1e-14),
+        Gf.Matrix4d(1).SetScale(1e14),
+        Gf.Matrix4d(1).SetTranslate(Gf.Vec3d(1e39, 0, 0)),
         Gf.Matrix4d(1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1),
     ],
 )

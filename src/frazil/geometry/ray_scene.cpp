@@ -154,6 +154,36 @@ bool RayScene::is_occluded(const Ray& ray) const {
     return query.tfar < 0.0f;
 }
 
+void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const {
+    constexpr std::size_t kWidth = 8;
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+#endif
+    for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
+        const std::size_t count = std::min(kWidth, rays.size() - begin);
+        alignas(32) int valid[kWidth];
+        alignas(32) RTCRay8 packet;
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            valid[i] = i < count ? -1 : 0;
+            const Ray& ray = rays[begin + (i < count ? i : 0)];
+            packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
+            packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
+            packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
+            packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
+        }
+#if FRAZIL_EMBREE_MAJOR >= 4
+        rtcOccluded8(valid, impl_->top, &packet, &arguments);
+#else
+        rtcOccluded8(valid, impl_->top, &context, &packet);
+#endif
+        for (std::size_t i = 0; i < count; ++i) out[begin + i] = packet.tfar[i] < 0.0f;
+    }
+}
+
 V3f offset_origin(const V3f& position, const V3f& normal) {
     // Integer steps in units of the last place far from the origin, a small constant near it.
     constexpr float kNearOrigin = 1.0f / 32.0f;

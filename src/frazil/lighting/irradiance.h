@@ -21,8 +21,9 @@
 namespace frazil {
 
 struct IrradianceOptions {
-    int samples = 64;  // per point and light, >= 1; a power of two is stratified best
+    int samples = 64;  // per point and light, 1 to 2^20; a power of two is stratified best
     std::uint32_t seed = 0;
+    LightComponent component = LightComponent::translucency;  // whose multipliers the lights take
 };
 
 struct Irradiance {
@@ -41,5 +42,8 @@ std::vector<std::string> light_groups(const std::vector<Light>& lights);
 Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
                            const std::function<float(float)>& transmittance, const IrradianceOptions& options = {},
                            Progress* progress = nullptr);
+
+// The rays that bake_irradiance traces, in its order: what a bench needs to compare with bare ray tracing.
+std::vector<Ray> shadow_rays(const PointSet& points, const LightSampler& lights, const IrradianceOptions& options = {});
 
 }  // namespace frazil

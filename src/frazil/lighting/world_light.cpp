@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "frazil/base/trigonometry.h"
 #include "frazil/lighting/spherical_rectangle.h"
 
 namespace frazil {
@@ -31,9 +32,9 @@ float cube(float x) {
 V3f sample_cone(const V3f& axis, float cap, const V2f& u) {
     const float one_minus_cos = cap * u.x;
     const float sine = std::sqrt(std::max(0.0f, one_minus_cos * (2.0f - one_minus_cos)));
-    const float phi = 2.0f * kPi * u.y;
+    const V2f circle = cos_sin_turns(u.y) * sine;
     const auto [s, t] = tangent_frame(axis);
-    return s * (sine * std::cos(phi)) + t * (sine * std::sin(phi)) + axis * (1.0f - one_minus_cos);
+    return s * circle.x + t * circle.y + axis * (1.0f - one_minus_cos);
 }
 
 V3f uniform_sphere(const V2f& u) {
@@ -161,6 +162,13 @@ Rgb WorldLight::dome_radiance(const V3f& direction) const {
     return radiance_ * dome.image->eval({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)});
 }
 
+Rgb WorldLight::dome_radiance(const V3f& direction, float& pdf) const {
+    const Dome& dome = std::get<Dome>(shape_);
+    pdf = 0.25f * kInvPi;
+    if (!dome.image) return radiance_;
+    return radiance_ * dome.image->eval({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)}, pdf);
+}
+
 float WorldLight::importance(const V3f& position) const {
     if (is_dome()) return kPi * brightness_;
     if (const Distant* distant = std::get_if<Distant>(&shape_)) return distant->size * brightness_;
@@ -188,17 +196,15 @@ void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> 
             sample.pdf = 0.25f * kInvPi;
             continue;
         }
-        const V3f local = dome.image->sample(u[i], sample.pdf);
+        const V3f local = dome.image->sample(u[i], sample.pdf, sample.radiance);
         sample.direction = dome.x * local.x + dome.y * local.y + dome.z * local.z;
-        sample.radiance = radiance_ * dome.image->eval(local);
+        sample.radiance *= radiance_;
     }
 }
 
-bool WorldLight::hit_by(const Dome& dome, const V3f&, const V3f& direction, LightHit& hit) const {
+bool WorldLight::hit_by(const Dome&, const V3f&, const V3f& direction, LightHit& hit) const {
+    hit.radiance = dome_radiance(direction, hit.pdf);
     hit.distance = kInfinity;
-    hit.radiance = dome_radiance(direction);
-    hit.pdf = dome.image ? dome.image->pdf({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)})
-                         : 0.25f * kInvPi;
     return true;
 }
 
@@ -276,8 +282,8 @@ void WorldLight::sample_from(const Disk& disk, const V3f& position, std::span<co
     if (!(height > 0.0f)) return;
     for (std::size_t i = 0; i < u.size(); ++i) {
         LightSample& sample = out[i];
-        const float r = std::sqrt(u[i].x), phi = 2.0f * kPi * u[i].y;
-        const V3f to_light = to_center + disk.x * (r * std::cos(phi)) + disk.y * (r * std::sin(phi));
+        const V2f circle = cos_sin_turns(u[i].y) * std::sqrt(u[i].x);
+        const V3f to_light = to_center + disk.x * circle.x + disk.y * circle.y;
         const float distance = to_light.length();
         sample.direction = to_light / distance;
         sample.distance = distance * kShadowEnd;

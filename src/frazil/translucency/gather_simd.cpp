@@ -117,7 +117,8 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                     const FloatV v3 = hn::MulAdd(v4, t, c3), s3 = hn::MulAdd(c5, t, v4);
                     const FloatV v2 = hn::MulAdd(v3, t, c2), s2 = hn::MulAdd(s3, t, v3), h2 = hn::MulAdd(c5, t, s3);
                     const FloatV v1 = hn::MulAdd(v2, t, c1), s1 = hn::MulAdd(s2, t, v2), h1 = hn::MulAdd(h2, t, s2);
-                    const FloatV value = hn::MulAdd(v1, t, c0), slope = hn::MulAdd(s1, t, v1), bend = hn::MulAdd(h1, t, s1);
+                    const FloatV value = hn::MulAdd(v1, t, c0), slope = hn::MulAdd(s1, t, v1),
+                                 bend = hn::MulAdd(h1, t, s1);
                     const FloatV even = hn::MulAdd(bend, by_curvature, hn::MulAdd(slope, by_slope, value));
                     FloatV lit = hn::MulAdd(slope, by_lean, even);
                     if constexpr (kHasRamp) {
