@@ -1,23 +1,104 @@
 """Frazil: renderer and look-development toolkit for glacier ice and other translucent matter."""
 
+import importlib
+from typing import Any
+
 from ._frazil import (
+    Camera,
+    ControlMesh,
+    CylinderLight,
     Dipole,
+    DiskLight,
+    DistantLight,
+    DomeLight,
+    IceMaterial,
+    Light,
+    Material,
     Medium,
     Mesh,
+    Object,
+    PointSet,
+    PointStatistics,
     PointTree,
     Ramp,
+    RectLight,
+    Scene,
+    SphereLight,
+    StandardMaterial,
+    Texture,
+    TextureLookup,
     area_compensation,
+    bake_irradiance,
     fresnel_average,
     fresnel_dielectric,
+    light_groups,
+    point_statistics,
+    subdivide,
+    tessellated_points,
+    triangulate,
 )
+from .warning import FrazilWarning
+
+# Names that need more than the core, and where they live: imported when first asked for.
+_LAZY = {
+    "Film": ".film",
+    "UsdScene": ".usd",
+    "load_usd": ".usd",
+    "poisson_points": ".points",
+    "read_meshes": ".usd",
+    "render": ".rendering",
+}
 
 __all__ = [
+    "Camera",
+    "ControlMesh",
+    "CylinderLight",
     "Dipole",
+    "DiskLight",
+    "DistantLight",
+    "DomeLight",
+    "Film",
+    "FrazilWarning",
+    "IceMaterial",
+    "Light",
+    "Material",
     "Medium",
     "Mesh",
+    "Object",
+    "PointSet",
+    "PointStatistics",
     "PointTree",
     "Ramp",
+    "RectLight",
+    "Scene",
+    "SphereLight",
+    "StandardMaterial",
+    "Texture",
+    "TextureLookup",
+    "UsdScene",
     "area_compensation",
+    "bake_irradiance",
     "fresnel_average",
     "fresnel_dielectric",
+    "light_groups",
+    "load_usd",
+    "point_statistics",
+    "poisson_points",
+    "read_meshes",
+    "render",
+    "subdivide",
+    "tessellated_points",
+    "triangulate",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'frazil' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

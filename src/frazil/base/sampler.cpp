@@ -1,5 +1,7 @@
 #include "frazil/base/sampler.h"
 
+#include <algorithm>
+
 #include "frazil/base/random.h"
 
 namespace frazil {
@@ -51,6 +53,37 @@ V2f Sampler::next_2d() {
     const std::uint32_t x = owen_scramble(reverse_bits(index), hash(pair_seed, 1U));
     const std::uint32_t y = owen_scramble(sobol_second(index), hash(pair_seed, 2U));
     return {to_unit_float(x), to_unit_float(y)};
+}
+
+ScrambledNet::ScrambledNet(int count) {
+    // Order the points along the curve that visits the square's quarters, and within each its quarters. Nested scrambling
+    // permutes quarters at every level but takes none apart.
+    struct Point {
+        std::uint64_t key;
+        std::uint32_t x, y;
+    };
+    std::vector<Point> points(static_cast<std::size_t>(count));
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        Point& point = points[i];
+        point.x = reverse_bits(i), point.y = sobol_second(i);
+        point.key = 0;
+        for (int bit = 31; bit >= 0; --bit) {
+            point.key = (point.key << 2) | (((point.x >> bit) & 1U) << 1) | ((point.y >> bit) & 1U);
+        }
+    }
+    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.key < b.key; });
+    for (const Point& point : points) {
+        x_.push_back(reverse_bits(point.x));
+        y_.push_back(reverse_bits(point.y));
+    }
+}
+
+void ScrambledNet::draw(std::uint32_t seed, std::uint32_t sequence, std::span<V2f> out) const {
+    const std::uint32_t key = hash(seed, sequence), key_x = hash(key, 1U), key_y = hash(key, 2U);
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        out[i] = {to_unit_float(reverse_bits(laine_karras(x_[i], key_x))),
+                  to_unit_float(reverse_bits(laine_karras(y_[i], key_y)))};
+    }
 }
 
 }  // namespace frazil

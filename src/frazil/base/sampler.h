@@ -7,6 +7,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "frazil/base/vec.h"
 
@@ -29,6 +31,21 @@ class Sampler {
     std::uint32_t sequence_seed_;
     std::uint32_t sample_;
     std::uint32_t dimension_ = 0;
+};
+
+// All samples of a pair of dimensions at once, many times faster than one by one: a fixed (0,m,2)-net whose points are
+// Owen-scrambled anew for every sequence. Points that follow one another lie near one another in the square, so that the
+// rays made of them are coherent.
+class ScrambledNet {
+  public:
+    explicit ScrambledNet(int count);
+    std::size_t size() const { return x_.size(); }
+
+    // Fill out[0 .. size()).
+    void draw(std::uint32_t seed, std::uint32_t sequence, std::span<V2f> out) const;
+
+  private:
+    std::vector<std::uint32_t> x_, y_;  // unscrambled coordinates, bits reversed
 };
 
 }  // namespace frazil

@@ -1,5 +1,6 @@
 // Vectors, matrices and colour: Imath types under the names that the core uses, and the few functions Imath lacks.
-// Model: row vectors as in Imath and USD: world = local * matrix.
+// Model: row vectors as in Imath and USD: world = local * matrix. A default-constructed vector is NOT zero (Imath leaves
+//   it as it is), also in a std::vector; a default-constructed matrix is the identity.
 // Units: positions in metres; Rgb is linear, Rec.709 primaries unless the scene says otherwise.
 // Valid: any finite value.
 // Not: spectra.

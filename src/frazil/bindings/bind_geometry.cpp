@@ -1,5 +1,8 @@
+#include <nanobind/stl/pair.h>
+
 #include "frazil/bindings/bindings.h"
 #include "frazil/geometry/mesh.h"
+#include "frazil/geometry/subdivision.h"
 
 namespace frazil {
 namespace {
@@ -29,6 +32,104 @@ void set_primvar(Primvar<T>& primvar, std::vector<T> values, const std::optional
         interpolation ? interpolation_named(*interpolation) : interpolation_of(values.size(), mesh, what);
     primvar.values = std::move(values);
     check_mesh(mesh, "Mesh");
+}
+
+const char* interpolation_name(Interpolation interpolation) {
+    constexpr const char* kNames[] = {"constant", "uniform", "vertex", "corner"};
+    return kNames[int(interpolation)];
+}
+
+template <class T, class Mesh>
+nb::object view_primvar(Primvar<T>& primvar, Mesh& owner) {
+    if (primvar.is_empty()) return nb::none();
+    return nb::cast(
+        view(&primvar.values.data()->x, {primvar.values.size(), sizeof(T) / sizeof(float)}, nb::find(owner)));
+}
+
+std::vector<std::int32_t> to_integers(const IntArray& array) {
+    return {array.data(), array.data() + array.size()};
+}
+
+template <class T>
+Primvar<T> to_primvar(const std::optional<std::pair<FloatArray, std::string>>& given,
+                      std::vector<T> (*convert)(const FloatArray&, const char*), const char* what) {
+    if (!given) return {};
+    return {convert(given->first, what), interpolation_named(given->second)};
+}
+
+nb::ndarray<nb::numpy, std::int32_t> to_array(std::vector<std::int32_t> values) {
+    auto* kept = new std::vector<std::int32_t>(std::move(values));
+    nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<std::vector<std::int32_t>*>(memory); });
+    return nb::ndarray<nb::numpy, std::int32_t>(kept->data(), {kept->size()}, owner);
+}
+
+void bind_control_mesh(nb::module_& module) {
+    using OptionalPrimvar = std::optional<std::pair<FloatArray, std::string>>;
+    nb::class_<ControlMesh>(
+        module, "ControlMesh",
+        "Polygons as USD gives them, right-handed.\n\n"
+        "Parameters\n----------\n"
+        "points : (V, 3) float32, metres.\n"
+        "face_vertex_counts, face_vertex_indices, hole_indices : int32.\n"
+        "crease_indices, crease_lengths, crease_sharpnesses, corner_indices, corner_sharpnesses : as in USD.\n"
+        "normals, uvs, colors : (array, interpolation) with 'constant', 'uniform', 'vertex' or 'corner'.\n"
+        "is_boundary_smooth : interpolateBoundary is edgeOnly.")
+        .def(
+            "__init__",
+            [](ControlMesh* self, const FloatArray& points, const IntArray& counts, const IntArray& indices,
+               const std::optional<IntArray>& holes, const std::optional<IntArray>& crease_indices,
+               const std::optional<IntArray>& crease_lengths, std::vector<float> crease_sharpnesses,
+               const std::optional<IntArray>& corner_indices, std::vector<float> corner_sharpnesses,
+               const OptionalPrimvar& normals, const OptionalPrimvar& uvs, const OptionalPrimvar& colors,
+               bool is_boundary_smooth) {
+                const auto integers = [](const std::optional<IntArray>& array) {
+                    return array ? to_integers(*array) : std::vector<std::int32_t>();
+                };
+                new (self) ControlMesh{to_vectors3(points, "ControlMesh: points"),
+                                       to_integers(counts),
+                                       to_integers(indices),
+                                       integers(holes),
+                                       integers(crease_indices),
+                                       integers(crease_lengths),
+                                       std::move(crease_sharpnesses),
+                                       integers(corner_indices),
+                                       std::move(corner_sharpnesses),
+                                       to_primvar(normals, &to_vectors3, "ControlMesh: normals"),
+                                       to_primvar(uvs, &to_vectors2, "ControlMesh: uvs"),
+                                       to_primvar(colors, &to_vectors3, "ControlMesh: colors"),
+                                       is_boundary_smooth};
+            },
+            "points"_a, "face_vertex_counts"_a, "face_vertex_indices"_a, nb::kw_only(), "hole_indices"_a = nb::none(),
+            "crease_indices"_a = nb::none(), "crease_lengths"_a = nb::none(),
+            "crease_sharpnesses"_a = std::vector<float>(), "corner_indices"_a = nb::none(),
+            "corner_sharpnesses"_a = std::vector<float>(), "normals"_a = nb::none(), "uvs"_a = nb::none(),
+            "colors"_a = nb::none(), "is_boundary_smooth"_a = false);
+
+    module.def(
+        "triangulate",
+        [](const ControlMesh& cage, const std::string& path) {
+            RefinedMesh refined;
+            {
+                nb::gil_scoped_release released;
+                refined = triangulate(cage, path);
+            }
+            return std::pair(std::move(refined.mesh), to_array(std::move(refined.faces)));
+        },
+        "cage"_a, "path"_a = "ControlMesh",
+        "Flat polygons as triangles: (Mesh, the face of each triangle (F,) int32). ValueError, beginning with `path`,\n"
+        "for indices or primvars that do not fit together.");
+    module.def(
+        "subdivide",
+        [](const ControlMesh& cage, int level, const std::string& path) {
+            RefinedMesh refined;
+            {
+                nb::gil_scoped_release released;
+                refined = subdivide(cage, level, path);
+            }
+            return std::pair(std::move(refined.mesh), to_array(std::move(refined.faces)));
+        },
+        "cage"_a, "level"_a, "path"_a = "ControlMesh",
+        "The Catmull-Clark limit surface, `level` quads along each edge: (Mesh, the face of each triangle).");
 }
 
 }  // namespace
@@ -83,10 +184,42 @@ void bind_geometry(nb::module_& module) {
                 set_primvar(mesh.colors, to_vectors3(values, "Mesh: colors"), interpolation, mesh, "colors");
             },
             "values"_a, "interpolation"_a = nb::none(), "Give display colours, linear RGB; see set_normals.")
+        .def_prop_ro(
+            "normals", [](Mesh& mesh) { return view_primvar(mesh.normals, mesh); },
+            nb::sig("def normals(self) -> numpy.ndarray | None"), "View of the normals, or None.")
+        .def_prop_ro(
+            "uvs", [](Mesh& mesh) { return view_primvar(mesh.uvs, mesh); },
+            nb::sig("def uvs(self) -> numpy.ndarray | None"), "View of the texture coordinates, or None.")
+        .def_prop_ro(
+            "colors", [](Mesh& mesh) { return view_primvar(mesh.colors, mesh); },
+            nb::sig("def colors(self) -> numpy.ndarray | None"), "View of the display colours, or None.")
+        .def_prop_ro("normals_interpolation",
+                     [](const Mesh& mesh) { return interpolation_name(mesh.normals.interpolation); })
+        .def_prop_ro("uvs_interpolation", [](const Mesh& mesh) { return interpolation_name(mesh.uvs.interpolation); })
+        .def_prop_ro("colors_interpolation",
+                     [](const Mesh& mesh) { return interpolation_name(mesh.colors.interpolation); })
+        .def(
+            "submesh",
+            [](const Mesh& mesh, const IntArray& triangles) {
+                const std::vector<std::int32_t> kept = to_integers(triangles);
+                for (const std::int32_t t : kept) {
+                    if (t < 0 || std::size_t(t) >= mesh.triangles.size()) {
+                        throw ValueError(
+                            str("Mesh: triangles must be in 0..", int(mesh.triangles.size()) - 1, ", got ", t, "."));
+                    }
+                }
+                return submesh(mesh, kept);
+            },
+            "triangles"_a, "Some of the triangles, by their indices (N,) int32, with the vertices that they use.")
+        .def(
+            "transformed",
+            [](const Mesh& mesh, const MatrixArray& matrix) { return transformed(mesh, to_matrix(matrix)); },
+            "matrix"_a, "Moved by a (4, 4) float64 matrix for row vectors; a mirroring one also flips the winding.")
         .def_prop_ro("area", &surface_area, "Surface area in square metres.")
         .def("__repr__", [](const Mesh& mesh) {
             return str("Mesh(", mesh.positions.size(), " vertices, ", mesh.triangles.size(), " triangles)");
         });
+    bind_control_mesh(module);
 }
 
 }  // namespace frazil

@@ -42,6 +42,7 @@ NB_MODULE(_frazil, module) {
     bind_points(module);
     bind_translucency(module);
     bind_lighting(module);
+    bind_material(module);
     bind_scene(module);
     bind_render(module);
 }

@@ -96,4 +96,56 @@ Mesh transformed(const Mesh& mesh, const M44f& local_to_world) {
     return result;
 }
 
+namespace {
+
+template <class T>
+Primvar<T> select(const Primvar<T>& primvar, const std::vector<std::int32_t>& triangles,
+                  const std::vector<std::int32_t>& kept_vertices) {
+    Primvar<T> result{{}, primvar.interpolation};
+    if (primvar.is_empty()) return result;
+    switch (primvar.interpolation) {
+        case Interpolation::constant:
+            result.values = primvar.values;
+            break;
+        case Interpolation::uniform:
+            for (const std::int32_t t : triangles) result.values.push_back(primvar.values[t]);
+            break;
+        case Interpolation::vertex:
+            for (const std::int32_t v : kept_vertices) result.values.push_back(primvar.values[v]);
+            break;
+        case Interpolation::corner:
+            for (const std::int32_t t : triangles) {
+                for (int corner = 0; corner < 3; ++corner) {
+                    result.values.push_back(primvar.values[3 * std::size_t(t) + corner]);
+                }
+            }
+            break;
+    }
+    return result;
+}
+
+}  // namespace
+
+Mesh submesh(const Mesh& mesh, const std::vector<std::int32_t>& triangles) {
+    Mesh result;
+    std::vector<std::int32_t> new_index(mesh.positions.size(), -1), kept_vertices;
+    for (const std::int32_t t : triangles) {
+        V3i triangle = mesh.triangles[t];
+        for (int corner = 0; corner < 3; ++corner) {
+            std::int32_t& index = new_index[triangle[corner]];
+            if (index < 0) {
+                index = std::int32_t(kept_vertices.size());
+                kept_vertices.push_back(triangle[corner]);
+            }
+            triangle[corner] = index;
+        }
+        result.triangles.push_back(triangle);
+    }
+    for (const std::int32_t v : kept_vertices) result.positions.push_back(mesh.positions[v]);
+    result.normals = select(mesh.normals, triangles, kept_vertices);
+    result.uvs = select(mesh.uvs, triangles, kept_vertices);
+    result.colors = select(mesh.colors, triangles, kept_vertices);
+    return result;
+}
+
 }  // namespace frazil

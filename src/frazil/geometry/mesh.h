@@ -75,4 +75,7 @@ Box3f bounds(const Mesh& mesh);
 // outside.
 Mesh transformed(const Mesh& mesh, const M44f& local_to_world);
 
+// Some of the triangles, in the order given, with the vertices that they use and no others.
+Mesh submesh(const Mesh& mesh, const std::vector<std::int32_t>& triangles);
+
 }  // namespace frazil

@@ -1,36 +1,17 @@
 #include "frazil/geometry/ray_scene.h"
 
-#if FRAZIL_EMBREE_MAJOR >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <bit>
 #include <cstring>
 
 #include "frazil/base/error.h"
+#include "frazil/geometry/embree.h"
 
 namespace frazil {
 namespace {
 
-// The device is shared: Embree keeps its own threads in TBB, so a second one would gain nothing.
-RTCDevice device() {
-    static const RTCDevice shared = rtcNewDevice(nullptr);
-    if (!shared) throw std::runtime_error("Embree: no device could be made on this processor.");
-    return shared;
-}
-
-void throw_if_embree_failed(const char* step) {
-    const RTCError code = rtcGetDeviceError(device());
-    if (code == RTC_ERROR_NONE) return;
-    if (code == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
-    throw std::runtime_error(str("Embree: ", step, " failed with error ", int(code), "."));
-}
-
 // A triangle geometry with its own copy of the vertices, moved by `local_to_world`.
 RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
-    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                  sizeof(V3f), mesh.positions.size()));
     auto* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(V3i),
@@ -46,7 +27,7 @@ RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
 }
 
 RTCScene make_scene() {
-    RTCScene scene = rtcNewScene(device());
+    RTCScene scene = rtcNewScene(embree_device());
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     return scene;
 }
@@ -117,7 +98,7 @@ RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>
             impl_->attach(make_geometry(mesh, placement.local_to_world), i);
             continue;
         }
-        RTCGeometry instance = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+        RTCGeometry instance = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_INSTANCE);
         rtcSetGeometryInstancedScene(instance, prototype);
         // Row vectors: the matrix in memory is column-major for Embree.
         rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &placement.local_to_world[0][0]);
@@ -171,6 +152,36 @@ bool RayScene::is_occluded(const Ray& ray) const {
     rtcOccluded1(impl_->top, &context, &query);
 #endif
     return query.tfar < 0.0f;
+}
+
+void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const {
+    constexpr std::size_t kWidth = 8;
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+#endif
+    for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
+        const std::size_t count = std::min(kWidth, rays.size() - begin);
+        alignas(32) int valid[kWidth];
+        alignas(32) RTCRay8 packet;
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            valid[i] = i < count ? -1 : 0;
+            const Ray& ray = rays[begin + (i < count ? i : 0)];
+            packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
+            packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
+            packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
+            packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
+        }
+#if FRAZIL_EMBREE_MAJOR >= 4
+        rtcOccluded8(valid, impl_->top, &packet, &arguments);
+#else
+        rtcOccluded8(valid, impl_->top, &context, &packet);
+#endif
+        for (std::size_t i = 0; i < count; ++i) out[begin + i] = packet.tfar[i] < 0.0f;
+    }
 }
 
 V3f offset_origin(const V3f& position, const V3f& normal) {

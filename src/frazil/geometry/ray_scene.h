@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "frazil/base/vec.h"
@@ -49,6 +50,8 @@ class RayScene {
     bool intersect(const Ray& ray, Hit& hit) const;
     // Whether anything lies in (t_min, t_max).
     bool is_occluded(const Ray& ray) const;
+    // The same for many rays at once; faster where rays that follow one another are alike. out[i] is 1 or 0.
+    void are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const;
 
   private:
     struct Impl;

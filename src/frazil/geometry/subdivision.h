@@ -1,8 +1,9 @@
-// Catmull-Clark surfaces as triangle meshes on the limit surface, by Embree's evaluation.
+// Polygon cages as triangle meshes: flat, or on the Catmull-Clark limit surface by Embree's evaluation.
 // Model: every face is cut into level x level quads (n-gons through their n sub-quads) whose corners lie on the limit
 //   surface, with limit normals. Vertices on shared edges are shared, so that a closed cage gives a watertight mesh.
 // Units: metres.
-// Valid: n-gons, boundaries, creases, corners, holes (faces left out of the result, but shaping their neighbours).
+// Valid: n-gons, boundaries, creases, corners, holes (faces left out of the result, but shaping their neighbours). Faces
+//   of fewer than three corners are left out; those of more than 15 (Embree's limit) are triangulated before.
 // Not: Loop and bilinear schemes; displacement.
 #pragma once
 
@@ -27,6 +28,7 @@ struct ControlMesh {
     std::vector<std::int32_t> corner_indices;
     std::vector<float> corner_sharpnesses;
     // Primvars of the cage: uniform, vertex (varying too) or corner (face-varying).
+    Primvar<V3f> normals;  // of flat polygons; a subdivided surface has its own
     Primvar<V2f> uvs;
     Primvar<Rgb> colors;
     bool is_boundary_smooth = false;  // interpolateBoundary: false = edgeAndCorner, true = edgeOnly
@@ -37,7 +39,12 @@ struct RefinedMesh {
     std::vector<std::int32_t> faces;  // the cage face of each triangle
 };
 
-// Refine the cage; `level` >= 1 is the number of quads along each edge of a quad face. Errors name `path`.
+// ValueError, beginning with `path`, for indices, counts and primvars that do not fit together or NaN positions.
+void check_control_mesh(const ControlMesh& cage, const std::string& path);
+
+// Refine the cage; `level` >= 1 is the number of quads along each edge of a quad face (made even where there are other
+// faces). Level 1 is the triangulated cage with its vertices on the limit surface. Face-varying uvs follow the surface
+// inside and are linear along seams and boundaries; colors are bilinear.
 RefinedMesh subdivide(const ControlMesh& cage, int level, const std::string& path);
 
 // The same cage as flat polygons: n-gons cut by ear clipping in their plane, holes left out.

@@ -1,9 +1,11 @@
 // Lights as UsdLux defines them, with Frazil's multipliers per component.
 // Model: UsdLuxLightAPI. `radiance` is the product of intensity, 2^exposure, color and colour temperature; with
-//   `normalize` it is divided by the light's area (or, for a distant light, the sine-squared of its half angle times
-//   pi).
-// Units: radiance (W/m²/sr) for dome and area lights; a distant light's `radiance` times its solid angle is irradiance.
-// Valid: finite values; negative radiance subtracts. Lights shine along -z of their frame; a rect spans x and y.
+//   `normalize` it is divided by the light's size: its area in world space, for a distant light pi sin² of its half angle,
+//   1 for a dome and for parallel light.
+// Units: radiance (W/m²/sr) for dome and area lights; a distant light's `radiance` times pi sin²(half angle) is the
+//   irradiance it gives, or `radiance` itself where its angle is 0.
+// Valid: finite values; negative radiance subtracts. Rect, disk and distant shine along -z of their frame, sphere and
+//   cylinder (about x, no caps) outwards; any invertible light_to_world, a dome's and a distant light's rotation alone.
 // Not: shaping, filters, linking.
 #pragma once
 
@@ -21,7 +23,7 @@ struct DomeLight {
     std::shared_ptr<const Environment> image;  // none = uniform
 };
 struct DistantLight {
-    float angle = 0.53f;  // full angle in degrees; 0 = parallel
+    float angle = 0.53f;  // full angle in degrees, 0 to 360; 0 = parallel
 };
 struct RectLight {
     float width = 1.0f, height = 1.0f;  // in the light's own units, scaled by light_to_world
@@ -32,8 +34,11 @@ struct DiskLight {
 struct SphereLight {
     float radius = 0.5f;
 };
+struct CylinderLight {
+    float length = 1.0f, radius = 0.5f;
+};
 
-using LightShape = std::variant<DomeLight, DistantLight, RectLight, DiskLight, SphereLight>;
+using LightShape = std::variant<DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight>;
 
 // The components that a light can be told to act on; each light has one multiplier per component.
 enum class LightComponent { diffuse, specular, translucency };
@@ -51,5 +56,11 @@ struct Light {
 
 // Refuse non-finite values and sizes out of range: ValueError beginning with the light's path.
 void check_light(const Light& light);
+
+// What `normalize` divides by (UsdLuxLightAPI's sizeFactor), in m² or steradian.
+double size_factor(const Light& light);
+
+// Radiance with `normalize` applied.
+Rgb emitted_radiance(const Light& light);
 
 }  // namespace frazil

@@ -1,58 +1,51 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: one light picked per sample by power, then a direction on it: area lights by solid angle where the closed form
-//   is known (sphere, rect), by area otherwise; dome by its image; [PBRT4, Section 12].
+// Model: one light picked per sample in proportion to the irradiance that it can give at the point, then a direction on
+//   it (world_light.h).
 // Units: pdf per steradian, the pick included.
-// Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power.
+// Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose diffuse and
+//   specular multipliers are both 0 is never picked by sample().
 #pragma once
 
-#include <limits>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "frazil/base/vec.h"
 #include "frazil/lighting/light.h"
+#include "frazil/lighting/world_light.h"
 
 namespace frazil {
 
-struct LightSample {
-    V3f direction;                                            // unit length, from the shading point to the light
-    float distance = std::numeric_limits<float>::infinity();  // where a shadow ray must end (a hair less)
-    Rgb radiance;                                             // towards the point, component multipliers not applied
-    float pdf = 0.0f;       // per steradian; 0 = no sample. Infinite (is_delta) for a parallel light
-    bool is_delta = false;  // then radiance is irradiance at normal incidence and pdf the pick's probability alone
-    int light = -1;
-};
-
-// What a ray sees of a light that it runs into.
-struct LightHit {
-    Rgb radiance;
-    float pdf = 0.0f;  // density with which sample() would have chosen this direction
-    float distance = std::numeric_limits<float>::infinity();
-    int light = -1;
-};
-
 class LightSampler {
   public:
+    // ValueError where check_light refuses a light.
     explicit LightSampler(const std::vector<Light>& lights);
 
-    bool is_empty() const;
-    const std::vector<Light>& lights() const;
+    bool is_empty() const { return lights_.empty(); }
+    const std::vector<Light>& lights() const { return lights_; }
+    const WorldLight& world_light(int light) const { return (*world_lights_)[std::size_t(light)]; }
 
     // One direction for the point; `u_pick` chooses the light, `u` the direction.
     LightSample sample(const V3f& position, float u_pick, const V2f& u) const;
     // A direction towards one given light, so that every light (group) can be served on its own; its pdf has no pick.
     LightSample sample_one(int light, const V3f& position, const V2f& u) const;
+    // Many at once: out[i] from u[i].
+    void sample_many(int light, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
 
-    // Every light along the ray that has a finite extent or is a dome, in front of t_max: appended to `hits`. pdf
-    // includes the pick of sample().
+    // Every light along the ray that has a finite extent or is a dome, in front of t_max: appended to `hits`. Light
+    // from infinity (dome, distant) is seen only where t_max is infinite. pdf includes the pick of sample().
     void intersect(const V3f& origin, const V3f& direction, float t_max, std::vector<LightHit>& hits) const;
 
     // Dome radiance alone (the background of camera rays).
     Rgb background(const V3f& direction) const;
 
   private:
-    struct Prepared;
+    // The weight of one light in the choice at a point.
+    float pick_weight(std::size_t light, const V3f& position) const;
+    float pick_total(const V3f& position) const;
+
     std::vector<Light> lights_;
-    std::shared_ptr<const Prepared> prepared_;
+    std::shared_ptr<const std::vector<WorldLight>> world_lights_;
 };
 
 }  // namespace frazil

@@ -1,11 +1,12 @@
-// Images on surfaces: bilinear lookup over a mip chain. Files are read in Python; the core sees arrays.
-// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image.
+// Images on surfaces: bilinear lookup. Files are read in Python; the core sees arrays.
+// Model: uv (0,0) is the lower left corner, as in USD; row 0 of the data is the top of the image. A missing alpha is 1.
 // Units: values after `scale` and `bias`, linear.
-// Valid: 1 to 4 channels; any size.
-// Not: UDIM, anisotropic filtering.
+// Valid: 1 to 4 channels; any size; a non-finite st reads as (0,0).
+// Not: UDIM, mip-maps, anisotropic filtering.
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "frazil/base/vec.h"
@@ -24,8 +25,8 @@ struct Texture {
 // value = texel * scale + bias.
 struct TextureLookup {
     std::shared_ptr<const Texture> texture;
-    int first_channel = 0;  // 0..3; a scalar input reads this one, a colour reads three from it
-    V3f scale = V3f(1.0f), bias = V3f(0.0f);
+    int first_channel = 0;                    // 0..3; a scalar input reads this one, a colour reads three from it
+    V3f scale = V3f(1.0f), bias = V3f(0.0f);  // by channel; a scalar input takes those of its channel, alpha takes z
     // st' = rotate(st * st_scale, st_rotation degrees) + st_translation
     V2f st_scale = V2f(1.0f), st_translation = V2f(0.0f);
     float st_rotation = 0.0f;
@@ -37,8 +38,14 @@ struct MaterialInput {
     TextureLookup lookup;  // used where it has a texture
 };
 
+// Refuse a texture whose size, channels and texel count do not agree, or with a texel that is not finite: ValueError
+// beginning with `path`.
+void check_texture(const Texture& texture, const std::string& path);
+
 // texel * scale + bias at st. A single-channel texture gives grey.
 Rgb eval_color(const MaterialInput<Rgb>& input, const V2f& st);
 float eval_float(const MaterialInput<float>& input, const V2f& st);
+// The tangent-space normal of a normal map, unit length; (0,0,1) without a texture.
+V3f eval_normal(const TextureLookup& lookup, const V2f& st);
 
 }  // namespace frazil

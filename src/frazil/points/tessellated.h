@@ -10,7 +10,7 @@
 
 namespace frazil {
 
-// ValueError where edge_length is not > 0 or the points would not fit into memory.
-PointSet tessellated_points(const Mesh& mesh, float edge_length);
+// ValueError where edge_length is not > 0, the mesh has no area, or the points would not fit into memory.
+PointSet tessellated_points(const Mesh& mesh, double edge_length);
 
 }  // namespace frazil

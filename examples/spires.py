@@ -1,0 +1,102 @@
+"""Spires of glacier ice: tapering shards with hollow faces between sharp ridges, ending in a point.
+
+Model: a signed field, the maximum over the faces of a polygon that shrinks, turns and bends towards the tip; each face
+    is hollow (melting hollows faces and keeps ridges), fluted along its height, and breaks where its knots lie.
+Units: metres, y up; fields are negative inside.
+Not: an exact distance: right to about 20 % near the surface, a lower bound away from it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Spire:
+    """A shard from `base` to `tip` (3,); `faces` rows are (angle, hollow, flute width, flute depth, phase)."""
+
+    base: np.ndarray
+    tip: np.ndarray
+    radius: float
+    faces: np.ndarray
+    knots: np.ndarray  # heights 0..1 where faces break
+    offsets: np.ndarray  # (faces, knots) distance of each face in units of the radius there
+    twist: float  # radians from base to tip
+    bend: np.ndarray  # sideways bulge half way up
+    power: float  # 1 = straight sides, more = horn
+
+
+def make_spire(rng: np.random.Generator, base, tip, radius: float, **fixed) -> Spire:
+    """A shard with random faces; `fixed` overrides fields of Spire."""
+    base, tip = np.asarray(base, np.float64), np.asarray(tip, np.float64)
+    count = int(rng.integers(4, 7))
+    angles = (np.arange(count) + rng.uniform(-0.28, 0.28, count)) * 2.0 * np.pi / count + rng.uniform(0, 6.28)
+    faces = np.stack(
+        [
+            angles,
+            rng.uniform(0.05, 0.24, count),
+            rng.uniform(0.16, 0.36, count),
+            rng.choice([0.0, 0.03, 0.055], count),
+            rng.uniform(0, 1, count),
+        ],
+        1,
+    )
+    knots = np.concatenate([[0.0], np.sort(rng.uniform(0.12, 0.85, 4)), [1.0]])
+    offsets = rng.uniform(0.66, 0.95, (count, 1)) + rng.uniform(-0.16, 0.30, (count, len(knots)))
+    length = np.linalg.norm(tip - base)
+    values = dict(
+        faces=faces,
+        knots=knots,
+        offsets=offsets,
+        twist=rng.uniform(-0.7, 0.7),
+        bend=rng.uniform(-0.06, 0.06, 3) * length * [1, 0, 1],
+        power=rng.uniform(0.95, 1.25),
+    )
+    return Spire(base, tip, radius, **(values | fixed))
+
+
+def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The field (N,) at points (N, 3), and the shard's radius (N,) at that height (0 at the tip)."""
+    axis = spire.tip - spire.base
+    length = np.linalg.norm(axis)
+    axis = axis / length
+    side = np.cross(axis, [0.0, 0.0, 1.0])
+    side /= np.linalg.norm(side)
+    depth = np.cross(side, axis)
+
+    v = points - spire.base
+    s = v @ axis / length
+    inner = np.clip(s, 0.0, 1.0)
+    v = v - (4.0 * inner * (1.0 - inner))[:, None] * spire.bend
+    x, z = v @ side, v @ depth
+    c, sn = np.cos(spire.twist * s), np.sin(spire.twist * s)
+    x, z = c * x - sn * z, sn * x + c * z
+
+    rest = 1.0 - s
+    radius = spire.radius * np.where(rest > 0, np.maximum(rest, 1e-9) ** spire.power, rest)
+    wide = np.maximum(radius, 1e-4)
+    slope = 1.0 / np.hypot(1.0, spire.radius / length)
+    result = np.full(len(points), -np.inf)
+    for (angle, hollow, width, flute, phase), offset in zip(spire.faces, spire.offsets, strict=True):
+        ca, sa = np.cos(angle), np.sin(angle)
+        across = (z * ca - x * sa) / wide
+        out = x * ca + z * sa - np.interp(s, spire.knots, offset) * radius
+        out += wide * hollow * np.maximum(1.0 - across * across, 0.0)
+        if flute > 0:
+            cup = 2.0 * np.mod(across / width + phase + 0.6 * np.sin(5.0 * s + 9.0 * phase), 1.0) - 1.0
+            out += wide * flute * (1.0 - cup * cup)
+        np.maximum(result, out * slope, out=result)
+    return np.maximum(result, -s * length - 0.1), np.maximum(radius, 0.0)
+
+
+def bounds(spire: Spire) -> tuple[np.ndarray, np.ndarray]:
+    """A box that holds the shard."""
+    reach = 1.35 * spire.radius + np.abs(spire.bend)
+    ends = np.stack([spire.base, spire.tip])
+    return ends.min(0) - reach, ends.max(0) + [reach[0], 0.02, reach[2]]
+
+
+def smooth_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
+    """The union of two fields with the crease between them rounded over `width`."""
+    h = np.maximum(width - np.abs(a - b), 0.0) / width
+    return np.minimum(a, b) - h * h * width * 0.25

@@ -1,0 +1,238 @@
+"""`frazil render`: a USD stage in, a layered EXR and a PNG preview out, one per frame."""
+
+import json
+import math
+import time
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .frames import fill_pattern, has_pattern, parse_frames, parse_resolution
+from .progress import PROGRESS_KINDS, make_progress
+
+__all__ = ["render_command"]
+
+DEFAULT_RESOLUTION = (960, 540)
+
+
+def _misused(option: str, message: str) -> typer.BadParameter:
+    return typer.BadParameter(message, param_hint=option)
+
+
+def _one_of(option: str, value: str, known: tuple[str, ...]) -> str:
+    """The value, where it is known; else the error with the nearest."""
+    if value in known:
+        return value
+    nearest = get_close_matches(value, known, n=1)
+    hint = f" Did you mean {nearest[0]}?" if nearest else ""
+    raise _misused(option, f"must be one of {', '.join(known)}, got '{value}'.{hint}")
+
+
+def _positive(option: str, value: float, may_be_zero: bool = False) -> None:
+    if math.isfinite(value) and (value > 0 or (may_be_zero and value == 0)):
+        return
+    raise _misused(option, f"must be {'>=' if may_be_zero else '>'} 0 and finite, got {value}.")
+
+
+def _within(option: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise _misused(option, f"must be from {low} to {high}, got {value}.")
+
+
+def render_command(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.usd", help="The stage: usd, usda, usdc or usdz.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", metavar="OUT.exr", help="The EXR to write. For frames: out.####.exr, $F4, <F4> or %04d."
+        ),
+    ],
+    camera: Annotated[
+        str | None, typer.Option(metavar="PATH", help="Prim path of the camera. Default: the stage's own, else a view.")
+    ] = None,
+    resolution: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),
+    ] = None,
+    samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel.")] = 32,
+    frame: Annotated[
+        float | None, typer.Option(metavar="F", help="Time code to render. Default: the stage's default values.")
+    ] = None,
+    frames: Annotated[
+        str | None, typer.Option(metavar="A-B[xSTEP]", help="Several frames, as in 1-100x2 or 1,5,20-30.")
+    ] = None,
+    threads: Annotated[int, typer.Option(metavar="N", help="0 = all cores; the picture is the same.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of all random numbers.")] = 0,
+    max_bounces: Annotated[int, typer.Option(metavar="N", help="Of diffuse and specular paths.")] = 4,
+    spacing: Annotated[
+        float, typer.Option(metavar="METRES", help="Between translucency points. 0 = by material.")
+    ] = 0.0,
+    spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
+    bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
+    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
+    estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
+    compression: Annotated[
+        str, typer.Option(metavar="NAME", help="Of the EXR: none, rle, zip, zips, piz, pxr24, b44, b44a, dwaa, dwab.")
+    ] = "zips",
+    aov: Annotated[
+        list[str] | None, typer.Option(metavar="LAYER", help="Write only these layers (repeat it, or comma between).")
+    ] = None,
+    png: Annotated[
+        Path | None, typer.Option("--png", metavar="OUT.png", help="The preview. Default: beside the EXR.")
+    ] = None,
+    no_png: Annotated[bool, typer.Option("--no-png", help="Write no preview.")] = False,
+    stats: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Write points, nodes, rays, seconds per stage, memory.")
+    ] = None,
+    progress: Annotated[
+        str, typer.Option(metavar="KIND", help="bar, farm (ALF_PROGRESS lines on stdout) or none.")
+    ] = "bar",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Only errors and warnings.")] = False,
+) -> None:
+    """Render a USD stage to a layered OpenEXR and a PNG preview."""
+    # What can be refused without reading the scene is refused first.
+    size = None
+    if resolution is not None:
+        try:
+            size = parse_resolution(resolution)
+        except ValueError as error:
+            raise _misused("--resolution", str(error)) from None
+    from ..image import COMPRESSIONS
+    from ..rendering import ESTIMATORS
+
+    _one_of("--compression", compression, COMPRESSIONS)
+    _one_of("--estimator", estimator, ESTIMATORS)
+    _one_of("--progress", progress, PROGRESS_KINDS)
+    _positive("--tolerance", tolerance)
+    _positive("--spacing-scale", spacing_scale)
+    _positive("--spacing", spacing, may_be_zero=True)
+    _within("--samples", samples, 1, 2**24)
+    _within("--threads", threads, 0, 4096)
+    _within("--seed", seed, 0, 2**32 - 1)
+    _within("--max-bounces", max_bounces, 0, 1024)
+    _within("--bake-samples", bake_samples, 1, 2**24)
+    layers = _chosen_layers(aov)
+    jobs = _jobs(output, png, no_png, frame, frames)
+    _refuse_unreadable(scene)
+    for _, exr, preview in jobs:
+        _refuse_unwritable(exr, preview)
+    if stats is not None:
+        _refuse_unwritable(stats)
+
+    from ..rendering import render as render_scene
+    from ..usd import load_usd
+
+    options: dict[str, Any] = {
+        "samples": samples,
+        "seed": seed,
+        "threads": threads,
+        "max_bounces": max_bounces,
+        "spacing": spacing,
+        "spacing_scale": spacing_scale,
+        "bake_samples": bake_samples,
+        "tolerance": tolerance,
+        "estimator": estimator,
+    }
+    records = []
+    with make_progress("none" if quiet and progress == "bar" else progress, len(jobs)) as reporter:
+        for time_code, exr, preview in jobs:
+            start = time.perf_counter()
+            loaded = load_usd(scene, frame=time_code, camera=camera)
+            seconds_load = time.perf_counter() - start
+            reporter("load", 1.0)
+
+            film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
+
+            start = time.perf_counter()
+            film.save(exr, compression, layers=layers)
+            if preview is not None:
+                film.save_preview(preview)
+            records.append(_record(film, time_code, exr, seconds_load, time.perf_counter() - start))
+            reporter.frame_done()
+            if stats is not None:
+                _write_stats(stats, scene, records)
+            if not quiet:
+                print(f"frazil: wrote {exr}" + (f" and {preview}" if preview is not None else ""), flush=True)
+
+
+# ---- what is asked for -----------------------------------------------------------------------------------------------
+
+
+def _chosen_layers(aov: list[str] | None) -> list[str] | None:
+    """The layers of `--aov`, the beauty first; None for all."""
+    if not aov:
+        return None
+    from .._frazil import aov_table
+
+    known = tuple(row["name"] for row in aov_table())
+    names = [_one_of("--aov", name.strip(), known) for part in aov for name in part.split(",")]
+    return list(dict.fromkeys(["beauty", *names]))
+
+
+def _jobs(
+    output: Path, png: Path | None, no_png: bool, frame: float | None, frames: str | None
+) -> list[tuple[float | None, Path, Path | None]]:
+    """(time code, EXR, PNG) for every frame that is asked for."""
+    if output.suffix.lower() != ".exr":
+        raise _misused("-o", f"must be a file name that ends in .exr, got '{output}'.")
+    if png is not None and png.suffix.lower() != ".png":
+        raise _misused("--png", f"must be a file name that ends in .png, got '{png}'.")
+    if png is not None and no_png:
+        raise _misused("--png", "must not be given together with --no-png.")
+    if frame is not None and frames is not None:
+        raise _misused("--frame", "must not be given together with --frames.")
+    if frame is not None and not math.isfinite(frame):
+        raise _misused("--frame", f"must be finite, got {frame}.")
+    try:
+        time_codes: list[float | None] = list(parse_frames(frames)) if frames is not None else [frame]
+    except ValueError as error:
+        raise _misused("--frames", str(error)) from None
+    if len(time_codes) > 1:
+        for option, path in (("-o", output), ("--png", png)):
+            if path is not None and not has_pattern(path):
+                raise _misused(option, f"must have a place for the frame's number, got '{path}'. As in out.####.exr.")
+    preview = None if no_png else png or output.with_suffix(".png")
+    try:
+        return [(t, fill_pattern(output, t), preview and fill_pattern(preview, t)) for t in time_codes]
+    except ValueError as error:
+        raise _misused("-o", str(error)) from None
+
+
+def _refuse_unreadable(scene: Path) -> None:
+    if not scene.exists():
+        raise FileNotFoundError(f"{scene}: file must exist. Check the path.")
+
+
+def _refuse_unwritable(*paths: Path | None) -> None:
+    from ..replacing import check_writable
+
+    for path in paths:
+        if path is not None:
+            check_writable(path)
+
+
+def _authored_resolution(loaded: Any) -> tuple[int, int]:
+    """The resolution that the stage's render settings ask for, else the default."""
+    settings = loaded.render_settings
+    return (settings and settings.resolution) or DEFAULT_RESOLUTION
+
+
+# ---- what is told ----------------------------------------------------------------------------------------------------
+
+
+def _record(film: Any, time_code: float | None, exr: Path, seconds_load: float, seconds_save: float) -> dict[str, Any]:
+    record = {key: value for key, value in film.stats.items() if key != "seconds"}
+    seconds = {"load": seconds_load, **film.stats.get("seconds", {}), "save": seconds_save}
+    size = {"width": film.width, "height": film.height}
+    return {"frame": time_code, "output": str(exr), **size, **record, "seconds": seconds}
+
+
+def _write_stats(path: Path, scene: Path, records: list[dict[str, Any]]) -> None:
+    from ..replacing import replacing
+    from ..version import version
+
+    text = json.dumps({"version": version(), "scene": str(scene), "frames": records}, indent=2)
+    with replacing(path) as temporary:
+        temporary.write_text(text + "\n")

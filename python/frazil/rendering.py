@@ -1,0 +1,190 @@
+"""`render`: from a scene to a film, on all cores, stoppable.
+
+Model: options are checked by the core; here they are named, sizes are predicted, and the work runs beside the main
+thread, so that Ctrl-C is heard while the core computes and stops it at the next tile.
+Units: metres; seconds in the stats, bytes for `peak_memory`.
+Not: reading scenes and writing files.
+"""
+
+import resource
+import sys
+import threading
+from collections.abc import Callable
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from . import _frazil
+from .film import Film
+from .version import version
+
+__all__ = ["ESTIMATORS", "Progress", "render"]
+
+Progress = Callable[[str, float], None]
+ESTIMATORS = ("noise_free", "sum")
+
+
+def render(
+    scene: Any,
+    *,
+    resolution: tuple[int, int] = (960, 540),
+    samples: int = 32,
+    seed: int = 0,
+    threads: int = 0,
+    max_bounces: int = 4,
+    spacing: float = 0.0,
+    spacing_scale: float = 1.0,
+    bake_samples: int = 64,
+    tolerance: float = 0.01,
+    estimator: str = "noise_free",
+    pixel_filter: str = "blackman_harris",
+    progress: Progress | None = None,
+) -> Film:
+    """Render a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `load_usd`, or made in Python.
+    resolution : (int, int)
+        Width and height in pixels, each from 1 to 65536.
+    samples : int
+        Camera paths per pixel, 1 or more.
+    seed : int
+        Of all random numbers. The same seed gives the same bits, for any number of threads.
+    threads : int
+        0 = all cores.
+    max_bounces : int
+        Of diffuse and specular paths after the first hit, 0 or more.
+    spacing : float
+        Of the translucency points, metres; 0 = by material.
+    spacing_scale : float
+        Multiplies every spacing, > 0.
+    bake_samples : int
+        Shadow rays per point and light, 1 or more.
+    tolerance : float
+        Relative error that clustering may make in a gather, > 0.
+    estimator : str
+        ``noise_free`` or ``sum``.
+    pixel_filter : str
+        ``blackman_harris`` or ``box``.
+    progress : callable, optional
+        Called as ``progress(stage, fraction)`` with fraction in [0, 1], from any thread. What it raises stops the
+        render and is raised here.
+
+    Returns
+    -------
+    Film
+        Its layers are views of the renderer's memory.
+
+    Raises
+    ------
+    ValueError
+        For a scene or options out of range; the message begins with the object's path.
+    MemoryError
+        Where the picture would not fit into the memory that is free.
+    KeyboardInterrupt
+        On Ctrl-C, at the next tile.
+
+    Examples
+    --------
+    >>> import frazil as fz
+    >>> film = fz.render(fz.load_usd("ice.usda"), resolution=(480, 270), samples=16)   # doctest: +SKIP
+    >>> film.save("ice.exr")                                                           # doctest: +SKIP
+    """
+    options = {
+        "width": resolution[0],
+        "height": resolution[1],
+        "samples": samples,
+        "seed": seed,
+        "threads": threads,
+        "max_bounces": max_bounces,
+        "spacing": spacing,
+        "spacing_scale": spacing_scale,
+        "bake_samples": bake_samples,
+        "tolerance": tolerance,
+        "estimator": estimator,
+        "filter": pixel_filter,
+    }
+    _refuse_what_cannot_fit(*resolution)
+    result = _stoppable(lambda report: _frazil.render(scene, progress=report, **options), progress)
+    stats = {**result.stats, "peak_memory": peak_memory()}
+    return Film(result.layers, _provenance(scene, options, stats), stats)
+
+
+def peak_memory() -> int:
+    """The most memory that this process has held so far, bytes."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _provenance(scene: Any, options: dict[str, Any], stats: dict[str, Any]) -> dict[str, Any]:
+    """Where the picture comes from, for its file's header. A scene made in Python has no file and no frame."""
+    frame = getattr(scene, "frame", None)
+    origin = {
+        "Software": f"Frazil {version()}",
+        "DateTime": datetime.now().strftime("%Y:%m:%d %H:%M:%S"),
+        "frazil:scene": getattr(scene, "file", None),
+        "frazil:frame": "default" if frame is None else float(frame),
+        "frazil:camera": scene.camera.path,
+        "worldToCamera": np.linalg.inv(scene.camera.matrix),
+        "frazil:objects": [item.path for item in scene.objects],
+        "frazil:dropped_samples": int(stats.get("dropped_samples", 0)),
+    }
+    return origin | {f"frazil:{name}": value for name, value in options.items() if name not in ("width", "height")}
+
+
+def _refuse_what_cannot_fit(width: int, height: int) -> None:
+    channels = sum(len(row["channels"]) for row in _frazil.aov_table())
+    needed = 4 * width * height * channels
+    free = _free_memory()
+    if needed > free:
+        raise MemoryError(
+            f"resolution: picture must fit into {free / 2**30:.1f} GiB of free memory, got {width}x{height}, "
+            f"which needs {needed / 2**30:.1f} GiB. Lower --resolution."
+        )
+
+
+def _free_memory() -> int:
+    try:
+        with open("/proc/meminfo") as lines:
+            return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
+    except (OSError, StopIteration):
+        return sys.maxsize
+
+
+def _stoppable(work: Callable[[Progress], Any], progress: Progress | None) -> Any:
+    """Run ``work(report)`` in a thread of its own; after an exception here report() raises, which stops the work.
+
+    Signals are heard only by the main thread while it runs Python, so it must not be the one that computes.
+    """
+    stop, done = threading.Event(), threading.Event()
+    outcome: dict[str, Any] = {}
+
+    def report(stage: str, fraction: float) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        if progress is not None:
+            progress(stage, fraction)
+
+    def run() -> None:
+        try:
+            outcome["result"] = work(report)
+        except BaseException as error:
+            outcome["error"] = error
+        finally:
+            done.set()
+
+    worker = threading.Thread(target=run, name="frazil render", daemon=True)
+    worker.start()
+    try:
+        done.wait()  # not join(): interrupted, that takes a running thread for a stopped one
+    except BaseException:
+        stop.set()
+        done.wait()
+        raise
+    finally:
+        worker.join()
+    if "error" in outcome:
+        raise outcome["error"]
+    return outcome["result"]

@@ -1,0 +1,167 @@
+"""Opening a stage and filling a Scene from it: units, up axis and time are settled here, once."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from pxr import Tf, Usd, UsdUtils
+
+from .._frazil import Mesh, Scene
+from .camera import choose_camera
+from .context import ReadContext
+from .instancing import StageWalker
+from .lights import add_grey_dome
+from .settings import RenderSettings, read_render_settings
+
+
+class UsdScene(Scene):
+    """A Scene that was read from a stage, with what the stage says beside it.
+
+    Attributes
+    ----------
+    file : str
+        The root layer.
+    frame : float or None
+        The time code that was read; None for default values.
+    render_settings : RenderSettings or None
+        Resolution, camera and products, where the stage has them.
+    warnings : list of str
+        Everything that was left out or replaced, each beginning with a prim's path.
+    """
+
+    file: str
+    frame: float | None
+    render_settings: RenderSettings | None
+    warnings: list[str]
+
+
+def load_usd(
+    path: str | os.PathLike,
+    frame: float | None = None,
+    camera: str | None = None,
+    *,
+    purposes: Iterable[str] = ("default", "render"),
+    subdivision_level: int = 2,
+) -> UsdScene:
+    """Read a USD stage (.usd, .usda, .usdc, .usdz) as a scene.
+
+    Parameters
+    ----------
+    path : str or path
+        The stage.
+    frame : float, optional
+        Time code; by default the stage's startTimeCode, or default values where it has no time range.
+    camera : str, optional
+        Path (or name, where only one has it) of the camera. By default the one that the render settings name, else the
+        only one, else one that frames the scene.
+    purposes : iterable of str
+        Which purposes are rendered, of 'default', 'render', 'proxy' and 'guide'.
+    subdivision_level : int
+        How often each edge of a Catmull-Clark mesh is halved, >= 0; dense meshes are halved less often.
+
+    Returns
+    -------
+    UsdScene
+        In metres, +y up. Whatever could not be read is named in its `warnings`, and as FrazilWarning.
+
+    Raises
+    ------
+    OSError
+        The file is missing, empty, broken or no USD.
+    ValueError
+        The camera does not exist, or an option is out of range.
+
+    Examples
+    --------
+    >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
+    >>> film = fz.render(scene)  # doctest: +SKIP
+    """
+    context, diagnostics = _open(path, frame, purposes, subdivision_level)
+    scene = UsdScene()
+    StageWalker(context, scene).walk()
+    if not scene.objects:
+        context.warn(context.file, "has no geometry that can be rendered.")
+    if not scene.lights:
+        add_grey_dome(context, scene)
+    settings = read_render_settings(context)
+    scene.camera = choose_camera(context, scene, camera, settings.camera if settings else None)
+    _pass_on(context, diagnostics)
+    scene.file = context.file
+    scene.frame = None if context.time.IsDefault() or context.time.IsEarliestTime() else context.time.GetValue()
+    scene.render_settings = settings
+    scene.warnings = context.warnings
+    return scene
+
+
+def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tuple[str, Mesh]]:
+    """The meshes of a USD stage, instances and all, in world space.
+
+    Parameters
+    ----------
+    path, frame
+        As in load_usd.
+
+    Returns
+    -------
+    list of (str, Mesh)
+        Prim path and mesh, metres, +y up.
+
+    Raises
+    ------
+    OSError
+        The file is missing, empty, broken or no USD.
+    """
+    context, diagnostics = _open(path, frame, ("default", "render"), 2)
+    scene = Scene()
+    StageWalker(context, scene).walk()
+    _pass_on(context, diagnostics)
+    return [(item.path, scene.mesh(item.mesh).transformed(item.matrix)) for item in scene.objects]
+
+
+def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int):
+    """The stage at its time, and the delegate that keeps USD's own messages off the terminal."""
+    name = os.fspath(path)
+    if frame is not None and not math.isfinite(frame):
+        raise ValueError(f"{name}: frame must be a finite number, got {frame}.")
+    if not 0 <= subdivision_level <= 8:
+        raise ValueError(f"{name}: subdivision_level must be in 0..8, got {subdivision_level}.")
+    wanted = frozenset(purposes)
+    unknown = wanted - {"default", "render", "proxy", "guide"}
+    if unknown:
+        raise ValueError(f"{name}: purposes must be of default, render, proxy, guide, got '{sorted(unknown)[0]}'.")
+    if not Path(name).exists():
+        raise FileNotFoundError(f"{name}: no such file.")
+    if not Path(name).is_file():
+        raise OSError(f"{name}: is not a file.")
+    if Path(name).stat().st_size == 0:
+        raise OSError(f"{name}: the file is empty.")
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        stage = Usd.Stage.Open(name)
+    except Tf.ErrorException as error:
+        raise OSError(f"{name}: is not a readable USD file: {_first_line(error)}") from error
+    if stage is None:
+        raise OSError(f"{name}: is not a readable USD file.")
+    if frame is not None:
+        time = Usd.TimeCode(frame)
+    elif stage.HasAuthoredTimeCodeRange():
+        time = Usd.TimeCode(stage.GetStartTimeCode())
+    else:
+        time = Usd.TimeCode.EarliestTime()
+    return ReadContext(stage, name, time, wanted, subdivision_level), diagnostics
+
+
+def _first_line(error: Tf.ErrorException) -> str:
+    """What USD itself said, without where in its source."""
+    said = [getattr(e, "commentary", str(e)).strip() for e in error.args]
+    lines = [line.strip() for text in said for line in text.splitlines() if line.strip()]
+    return lines[0] if lines else "it cannot be opened"
+
+
+def _pass_on(context: ReadContext, diagnostics: UsdUtils.CoalescingDiagnosticDelegate) -> None:
+    """USD's own messages (broken references and the like) as warnings."""
+    for diagnostic in diagnostics.TakeUncoalescedDiagnostics():
+        context.warn(context.file, f"USD: {' '.join(diagnostic.commentary.split())}")

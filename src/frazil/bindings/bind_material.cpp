@@ -1,0 +1,286 @@
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/variant.h>
+
+#include <cstring>
+
+#include "frazil/bindings/bindings.h"
+#include "frazil/material/ice.h"
+#include "frazil/material/standard.h"
+
+namespace frazil {
+namespace {
+
+using Triple = std::array<float, 3>;
+using Pair = std::array<float, 2>;
+// What a material input is given as: a constant or a texture.
+using ColorInput = std::variant<TextureLookup, Triple>;
+using FloatInput = std::variant<TextureLookup, float>;
+
+constexpr std::pair<Wrap, const char*> kWrapNames[] = {
+    {Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}, {Wrap::mirror, "mirror"}, {Wrap::black, "black"}};
+constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {{CompensationMode::off, "off"},
+                                                                           {CompensationMode::ratio, "ratio"},
+                                                                           {CompensationMode::conserve, "conserve"},
+                                                                           {CompensationMode::fill, "fill"},
+                                                                           {CompensationMode::linear, "linear"}};
+
+template <class Enum, std::size_t N>
+Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {
+    std::string known;
+    for (const auto& [value, text] : names) {
+        if (name == text) return value;
+        known += (known.empty() ? "" : ", ") + std::string(text);
+    }
+    throw ValueError(str(what, " must be one of ", known, ", got '", name, "'."));
+}
+
+template <class Enum, std::size_t N>
+const char* to_name(const std::pair<Enum, const char*> (&names)[N], Enum value) {
+    for (const auto& [known, text] : names) {
+        if (known == value) return text;
+    }
+    return "";
+}
+
+V3f to_v3f(const Triple& t) {
+    return {t[0], t[1], t[2]};
+}
+Triple from_v3f(const V3f& v) {
+    return {v.x, v.y, v.z};
+}
+
+MaterialInput<Rgb> to_input(const ColorInput& input) {
+    if (const auto* lookup = std::get_if<TextureLookup>(&input)) return {Rgb(0.0f), *lookup};
+    return {to_v3f(std::get<Triple>(input)), {}};
+}
+MaterialInput<float> to_input(const FloatInput& input) {
+    if (const auto* lookup = std::get_if<TextureLookup>(&input)) return {0.0f, *lookup};
+    return {std::get<float>(input), {}};
+}
+ColorInput from_input(const MaterialInput<Rgb>& input) {
+    if (input.lookup.texture) return input.lookup;
+    return from_v3f(input.value);
+}
+FloatInput from_input(const MaterialInput<float>& input) {
+    if (input.lookup.texture) return input.lookup;
+    return input.value;
+}
+
+// A property that reads and writes a MaterialInput as a constant or a TextureLookup.
+template <class Class, class Model, class Value>
+void def_input(Class& cls, const char* name, MaterialInput<Value> Model::*member) {
+    using Input = std::conditional_t<std::is_same_v<Value, float>, FloatInput, ColorInput>;
+    cls.def_prop_rw(
+        name, [member](const Model& model) { return from_input(model.*member); },
+        [member](Model& model, const Input& input) { model.*member = to_input(input); });
+}
+
+void bind_texture(nb::module_& module) {
+    nb::class_<Texture>(module, "Texture",
+                        "An image on a surface.\n\n"
+                        "Parameters\n----------\n"
+                        "texels : (height, width, channels) float32, linear, 1 to 4 channels, row 0 on top. Copied.\n"
+                        "wrap_s, wrap_t : 'repeat', 'clamp', 'mirror' or 'black'.")
+        .def(
+            "__init__",
+            [](Texture* self, const nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>& texels,
+               const std::string& wrap_s, const std::string& wrap_t) {
+                if (texels.size() == 0 || texels.shape(2) > 4) {
+                    throw ValueError(str("Texture: texels must have shape (height, width, 1..4), got (",
+                                         texels.shape(0), ", ", texels.shape(1), ", ", texels.shape(2), ")."));
+                }
+                new (self) Texture{int(texels.shape(1)),
+                                   int(texels.shape(0)),
+                                   int(texels.shape(2)),
+                                   std::vector<float>(texels.data(), texels.data() + texels.size()),
+                                   from_name(kWrapNames, wrap_s, "Texture: wrap_s"),
+                                   from_name(kWrapNames, wrap_t, "Texture: wrap_t")};
+            },
+            "texels"_a, "wrap_s"_a = "repeat", "wrap_t"_a = "repeat")
+        .def_prop_ro("texels",
+                     [](Texture& texture) {
+                         return view(
+                             texture.texels.data(),
+                             {std::size_t(texture.height), std::size_t(texture.width), std::size_t(texture.channels)},
+                             nb::find(texture));
+                     })
+        .def_prop_ro("wrap_s", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_s); })
+        .def_prop_ro("wrap_t", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_t); })
+        .def("__repr__", [](const Texture& texture) {
+            return str("Texture(", texture.width, "x", texture.height, ", ", texture.channels, " channels)");
+        });
+
+    nb::class_<TextureLookup>(module, "TextureLookup",
+                              "How a material input reads a texture: texel * scale + bias, at\n"
+                              "st' = rotate(st * st_scale, st_rotation degrees) + st_translation.\n\n"
+                              "Parameters\n----------\n"
+                              "texture : Texture, shared, not copied.\n"
+                              "first_channel : 0..3; a scalar input reads this channel, a colour three from it on.")
+        .def(
+            "__init__",
+            [](TextureLookup* self, const std::shared_ptr<Texture>& texture, int first_channel, const Triple& scale,
+               const Triple& bias, const Pair& st_scale, float st_rotation, const Pair& st_translation) {
+                if (first_channel < 0 || first_channel > 3) {
+                    throw ValueError(str("TextureLookup: first_channel must be in 0..3, got ", first_channel, "."));
+                }
+                new (self) TextureLookup{texture,
+                                         first_channel,
+                                         to_v3f(scale),
+                                         to_v3f(bias),
+                                         V2f(st_scale[0], st_scale[1]),
+                                         V2f(st_translation[0], st_translation[1]),
+                                         st_rotation};
+            },
+            "texture"_a, "first_channel"_a = 0, "scale"_a = Triple{1, 1, 1}, "bias"_a = Triple{0, 0, 0},
+            "st_scale"_a = Pair{1, 1}, "st_rotation"_a = 0.0f, "st_translation"_a = Pair{0, 0})
+        .def_prop_ro("texture",
+                     [](const TextureLookup& lookup) { return std::const_pointer_cast<Texture>(lookup.texture); })
+        .def_ro("first_channel", &TextureLookup::first_channel)
+        .def_prop_ro("scale", [](const TextureLookup& lookup) { return from_v3f(lookup.scale); })
+        .def_prop_ro("bias", [](const TextureLookup& lookup) { return from_v3f(lookup.bias); })
+        .def_prop_ro("st_scale",
+                     [](const TextureLookup& lookup) {
+                         return Pair{lookup.st_scale.x, lookup.st_scale.y};
+                     })
+        .def_prop_ro("st_translation",
+                     [](const TextureLookup& lookup) {
+                         return Pair{lookup.st_translation.x, lookup.st_translation.y};
+                     })
+        .def_ro("st_rotation", &TextureLookup::st_rotation)
+        .def("__repr__", [](const TextureLookup& lookup) {
+            return str("TextureLookup(", lookup.texture ? str(lookup.texture->width, "x", lookup.texture->height) : "",
+                       ", channel ", lookup.first_channel, ")");
+        });
+}
+
+void bind_standard(nb::module_& module) {
+    const StandardMaterial preset;
+    nb::class_<StandardMaterial> cls(module, "StandardMaterial",
+                                     "UsdPreviewSurface. Inputs take a constant or a TextureLookup; the names and\n"
+                                     "defaults are the specification's, in snake_case.");
+    cls.def(
+        "__init__",
+        [](StandardMaterial* self, const ColorInput& diffuse_color, bool uses_display_color,
+           const ColorInput& emissive_color, bool use_specular_workflow, const ColorInput& specular_color,
+           const FloatInput& metallic, const FloatInput& roughness, const FloatInput& clearcoat,
+           const FloatInput& clearcoat_roughness, const FloatInput& opacity, float opacity_threshold, float ior,
+           const std::optional<TextureLookup>& normal) {
+            new (self) StandardMaterial{
+                to_input(diffuse_color),         uses_display_color, to_input(emissive_color), use_specular_workflow,
+                to_input(specular_color),        to_input(metallic), to_input(roughness),      to_input(clearcoat),
+                to_input(clearcoat_roughness),   to_input(opacity),  opacity_threshold,        ior,
+                normal.value_or(TextureLookup{})};
+        },
+        nb::kw_only(), "diffuse_color"_a = ColorInput(from_v3f(preset.diffuse_color.value)),
+        "uses_display_color"_a = false, "emissive_color"_a = ColorInput(Triple{0, 0, 0}),
+        "use_specular_workflow"_a = false, "specular_color"_a = ColorInput(Triple{0, 0, 0}),
+        "metallic"_a = FloatInput(preset.metallic.value), "roughness"_a = FloatInput(preset.roughness.value),
+        "clearcoat"_a = FloatInput(preset.clearcoat.value),
+        "clearcoat_roughness"_a = FloatInput(preset.clearcoat_roughness.value),
+        "opacity"_a = FloatInput(preset.opacity.value), "opacity_threshold"_a = 0.0f, "ior"_a = preset.ior,
+        "normal"_a = nb::none());
+    def_input(cls, "diffuse_color", &StandardMaterial::diffuse_color);
+    def_input(cls, "emissive_color", &StandardMaterial::emissive_color);
+    def_input(cls, "specular_color", &StandardMaterial::specular_color);
+    def_input(cls, "metallic", &StandardMaterial::metallic);
+    def_input(cls, "roughness", &StandardMaterial::roughness);
+    def_input(cls, "clearcoat", &StandardMaterial::clearcoat);
+    def_input(cls, "clearcoat_roughness", &StandardMaterial::clearcoat_roughness);
+    def_input(cls, "opacity", &StandardMaterial::opacity);
+    cls.def_rw("uses_display_color", &StandardMaterial::uses_display_color)
+        .def_rw("use_specular_workflow", &StandardMaterial::use_specular_workflow)
+        .def_rw("opacity_threshold", &StandardMaterial::opacity_threshold)
+        .def_rw("ior", &StandardMaterial::ior)
+        .def_prop_ro("normal",
+                     [](const StandardMaterial& model) {
+                         return model.normal.texture ? std::optional(model.normal) : std::nullopt;
+                     })
+        .def("__repr__", [](const StandardMaterial& model) {
+            const Rgb& c = model.diffuse_color.value;
+            if (model.uses_display_color) return std::string("StandardMaterial(displayColor)");
+            if (model.diffuse_color.lookup.texture) return std::string("StandardMaterial(textured)");
+            return str("StandardMaterial(diffuse_color=(", c.x, ", ", c.y, ", ", c.z, "))");
+        });
+}
+
+void bind_ice(nb::module_& module) {
+    nb::class_<IceMaterial> cls(
+        module, "IceMaterial",
+        "frazil:ice: a translucent core under a glossy dielectric boundary.\n\n"
+        "Parameters\n----------\n"
+        "medium : Medium, in 1/m.\n"
+        "roughness : float in [0, 1], or a TextureLookup.\n"
+        "specular, translucency : weights in [0, 1] of the reflection and of the core.\n"
+        "tint : RGB factor on what leaves the core, or a TextureLookup.\n"
+        "ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.\n"
+        "ramp_preserve_energy : keep the total reflectance whatever the ramp.\n"
+        "compensation : 'off', 'ratio', 'conserve', 'fill' or 'linear'; compensation_limit >= 1;\n"
+        "    compensation_strength in [0, 1].\n"
+        "spacing : of the points, metres; 0 = from the mean free path.\n\n"
+        "Ranges are checked when the scene is rendered.");
+    cls.def(
+        "__init__",
+        [](IceMaterial* self, const Medium& medium, const FloatInput& roughness, float specular, float translucency,
+           const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
+           bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
+           float compensation_strength, float spacing) {
+            Ramp ramp{ramp_distances, {}, ramp_preserve_energy};
+            for (const Triple& color : ramp_colors) ramp.colors.push_back(to_v3f(color));
+            new (self) IceMaterial{medium,
+                                   to_input(roughness),
+                                   specular,
+                                   translucency,
+                                   to_input(tint),
+                                   std::move(ramp),
+                                   {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
+                                    compensation_limit, compensation_strength},
+                                   spacing};
+        },
+        "medium"_a, nb::kw_only(), "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
+        "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
+        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "ratio",
+        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
+    def_input(cls, "roughness", &IceMaterial::roughness);
+    def_input(cls, "tint", &IceMaterial::tint);
+    cls.def_rw("medium", &IceMaterial::medium)
+        .def_rw("specular", &IceMaterial::specular)
+        .def_rw("translucency", &IceMaterial::translucency)
+        .def_rw("spacing", &IceMaterial::spacing)
+        .def_prop_ro("ramp_distances", [](const IceMaterial& model) { return model.ramp.distances; })
+        .def_prop_ro("ramp_colors",
+                     [](const IceMaterial& model) {
+                         std::vector<Triple> colors;
+                         for (const Rgb& color : model.ramp.colors) colors.push_back(from_v3f(color));
+                         return colors;
+                     })
+        .def_prop_ro("ramp_preserve_energy", [](const IceMaterial& model) { return model.ramp.preserve_energy; })
+        .def_prop_rw(
+            "compensation",
+            [](const IceMaterial& model) { return to_name(kCompensationNames, model.compensation.mode); },
+            [](IceMaterial& model, const std::string& name) {
+                model.compensation.mode = from_name(kCompensationNames, name, "IceMaterial: compensation");
+            })
+        .def_prop_rw(
+            "compensation_limit", [](const IceMaterial& model) { return model.compensation.limit; },
+            [](IceMaterial& model, float limit) { model.compensation.limit = limit; })
+        .def_prop_rw(
+            "compensation_strength", [](const IceMaterial& model) { return model.compensation.strength; },
+            [](IceMaterial& model, float strength) { model.compensation.strength = strength; })
+        .def("__repr__", [](const IceMaterial& model) {
+            const Medium& m = model.medium;
+            return str("IceMaterial(sigma_s_prime=(", m.sigma_s_prime.x, ", ", m.sigma_s_prime.y, ", ",
+                       m.sigma_s_prime.z, "), sigma_a=(", m.sigma_a.x, ", ", m.sigma_a.y, ", ", m.sigma_a.z,
+                       "), eta=", m.eta, ")");
+        });
+}
+
+}  // namespace
+
+void bind_material(nb::module_& module) {
+    bind_texture(module);
+    bind_standard(module);
+    bind_ice(module);
+}
+
+}  // namespace frazil

@@ -1,0 +1,188 @@
+#include "frazil/lighting/environment.h"
+
+#include "frazil/base/error.h"
+#include "frazil/base/parallel.h"
+#include "frazil/base/trigonometry.h"
+
+namespace frazil {
+namespace {
+
+// What sampling counts as light: positive also where a pixel subtracts.
+float weight_of(const Rgb& c) {
+    return 0.2126f * std::abs(c.x) + 0.7152f * std::abs(c.y) + 0.0722f * std::abs(c.z);
+}
+
+// The interval of a cdf of `count` bins that holds u: its probability is never 0.
+int find_bin(const float* cdf, int count, float u) {
+    // The last edge that is <= u, without branches to mispredict.
+    int bin = 0, length = count;
+    while (length > 1) {
+        const int half = length / 2;
+        bin += cdf[bin + half] <= u ? half : 0;
+        length -= half;
+    }
+    while (bin > 0 && cdf[bin + 1] == cdf[bin]) --bin;
+    return bin;
+}
+
+// x in [0, 1] with density proportional to the line from a to b; a and b >= 0.
+float sample_line(float u, float a, float b) {
+    if (a + b <= 0.0f) return u;
+    return std::min(u * (a + b) / (a + std::sqrt(a * a * (1.0f - u) + b * b * u) + 1e-37f), 1.0f);
+}
+
+// Turn weights[0..count) at cdf[1..count] into a cdf ending in 1; uniform where they are all 0.
+double finish_cdf(float* cdf, int count, const std::vector<double>& weights) {
+    double total = 0.0;
+    for (const double w : weights) total += w;
+    double sum = 0.0;
+    cdf[0] = 0.0f;
+    for (int i = 0; i < count; ++i) {
+        sum += weights[std::size_t(i)];
+        cdf[i + 1] = static_cast<float>(total > 0.0 ? sum / total : double(i + 1) / count);
+    }
+    cdf[count] = 1.0f;
+    return total;
+}
+
+}  // namespace
+
+Environment::Environment(int width, int height, std::vector<Rgb> pixels, const std::string& path)
+    : width_(width), height_(height), pixels_(std::move(pixels)) {
+    if (width < 1 || height < 1 || pixels_.size() != std::size_t(width) * std::size_t(height)) {
+        throw ValueError(str(path, ": pixels must be width * height of at least 1 x 1, got ", width, " x ", height,
+                             " with ", pixels_.size(), " pixels."));
+    }
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+        if (is_finite(pixels_[i])) continue;
+        throw ValueError(str(path, ": pixels must be finite, got (", pixels_[i].x, ", ", pixels_[i].y, ", ",
+                             pixels_[i].z, ") at column ", i % std::size_t(width), ", row ", i / std::size_t(width),
+                             ". Repair the image."));
+    }
+    // Rows of cells: half a pixel at each pole, whole ones between.
+    const std::size_t w = std::size_t(width), rows = std::size_t(height) + 1;
+    row_cosine_.resize(rows + 1);
+    for (std::size_t y = 0; y <= rows; ++y) {
+        row_cosine_[y] = static_cast<float>(std::cos(3.14159265358979323846 * (double(y) - 0.5) / height));
+    }
+    row_cosine_.front() = 1.0f, row_cosine_.back() = -1.0f;
+
+    // One distribution per row over the mean of the corners' luminance.
+    conditional_cdf_.resize(rows * (w + 1));
+    std::vector<double> row_weight(rows);
+    std::vector<V3d> row_sum(rows, V3d(0.0));
+    parallel_for(rows, 16, [&](std::size_t begin, std::size_t end) {
+        std::vector<double> column(w), cell(w);
+        for (std::size_t y = begin; y < end; ++y) {
+            const Rgb* above = &pixels_[(y == 0 ? 0 : y - 1) * w];
+            const Rgb* below = &pixels_[std::min(y, rows - 2) * w];
+            for (std::size_t x = 0; x < w; ++x) {
+                column[x] = double(weight_of(above[x])) + double(weight_of(below[x]));
+                row_sum[y] += (V3d(above[x]) + V3d(below[x])) * 0.5;
+            }
+            for (std::size_t x = 0; x < w; ++x) cell[x] = 0.25 * (column[x] + column[x + 1 == w ? 0 : x + 1]);
+            row_weight[y] = finish_cdf(&conditional_cdf_[y * (w + 1)], width, cell);
+        }
+    });
+    V3d average(0.0);
+    double total = 0.0;
+    for (std::size_t y = 0; y < rows; ++y) {
+        const double share = 0.5 * (double(row_cosine_[y]) - double(row_cosine_[y + 1]));
+        row_weight[y] *= share;
+        total += row_weight[y];
+        average += row_sum[y] * (share / double(w));
+    }
+    average_ = Rgb(average);
+    // Each cell's weight is the exact mean of its density, so that one number normalises all.
+    integral_ = static_cast<float>(4.0 * 3.14159265358979323846 * total / double(w));
+    if (total == 0.0) {
+        for (std::size_t y = 0; y < rows; ++y) row_weight[y] = double(row_cosine_[y]) - double(row_cosine_[y + 1]);
+    }
+    marginal_cdf_.resize(rows + 1);
+    finish_cdf(marginal_cdf_.data(), int(rows), row_weight);
+}
+
+void Environment::set_corners(Cell& cell) const {
+    const int right = cell.column + 1 == width_ ? 0 : cell.column + 1;
+    const Rgb* above = &pixels_[std::size_t(std::max(cell.row - 1, 0)) * std::size_t(width_)];
+    const Rgb* below = &pixels_[std::size_t(std::min(cell.row, height_ - 1)) * std::size_t(width_)];
+    cell.corner[0] = above + cell.column, cell.corner[1] = above + right;
+    cell.corner[2] = below + cell.column, cell.corner[3] = below + right;
+}
+
+Environment::Cell Environment::cell_of(const V3f& direction) const {
+    const float theta = fast_atan2(std::sqrt(direction.x * direction.x + direction.z * direction.z), direction.y);
+    // Longitude is +pi at the left edge and falls to the right; +x has longitude pi/2.
+    const float longitude = fast_atan2(direction.x, direction.z);
+    float x = (0.5f - longitude * (0.5f * kInvPi)) * float(width_) - 0.5f;
+    if (x < 0.0f) x += float(width_);
+    const float y = theta * kInvPi * float(height_) + 0.5f;
+    Cell cell;
+    cell.column = std::clamp(int(x), 0, width_ - 1);
+    cell.row = std::clamp(int(y), 0, height_);
+    cell.across = std::clamp(x - float(cell.column), 0.0f, 1.0f);
+    cell.down = std::clamp(y - float(cell.row), 0.0f, 1.0f);
+    set_corners(cell);
+    return cell;
+}
+
+Rgb Environment::radiance_in(const Cell& cell) {
+    const float x = cell.across, y = cell.down;
+    return (*cell.corner[0] * (1.0f - x) + *cell.corner[1] * x) * (1.0f - y) +
+           (*cell.corner[2] * (1.0f - x) + *cell.corner[3] * x) * y;
+}
+
+float Environment::pdf_in(const Cell& cell, float down_cosine) const {
+    if (integral_ == 0.0f) return 0.25f * kInvPi;
+    const float x = cell.across;
+    const float upper = weight_of(*cell.corner[0]) * (1.0f - x) + weight_of(*cell.corner[1]) * x;
+    const float lower = weight_of(*cell.corner[2]) * (1.0f - x) + weight_of(*cell.corner[3]) * x;
+    return (upper * (1.0f - down_cosine) + lower * down_cosine) / integral_;
+}
+
+Rgb Environment::eval(const V3f& direction) const {
+    return radiance_in(cell_of(direction));
+}
+
+Rgb Environment::eval(const V3f& direction, float& pdf) const {
+    const Cell cell = cell_of(direction);
+    const float top = row_cosine_[std::size_t(cell.row)], bottom = row_cosine_[std::size_t(cell.row) + 1];
+    pdf = pdf_in(cell, std::clamp((top - direction.y) / (top - bottom), 0.0f, 1.0f));
+    return radiance_in(cell);
+}
+
+float Environment::pdf(const V3f& direction) const {
+    float pdf;
+    eval(direction, pdf);
+    return pdf;
+}
+
+V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
+    Cell cell;
+    cell.row = find_bin(marginal_cdf_.data(), height_ + 1, u.y);
+    const float* cdf = &conditional_cdf_[std::size_t(cell.row) * (std::size_t(width_) + 1)];
+    cell.column = find_bin(cdf, width_, u.x);
+    set_corners(cell);
+    // What is left of u within its bin becomes the place within the cell, by the slope between its corners.
+    const auto rest = [](const float* bins, int bin, float value) {
+        return std::clamp((value - bins[bin]) / (bins[bin + 1] - bins[bin]), 0.0f, 1.0f);
+    };
+    const float a = weight_of(*cell.corner[0]), b = weight_of(*cell.corner[1]);
+    const float c = weight_of(*cell.corner[2]), d = weight_of(*cell.corner[3]);
+    const float down = sample_line(rest(marginal_cdf_.data(), cell.row, u.y), a + b, c + d);
+    cell.across = sample_line(rest(cdf, cell.column, u.x), a + (c - a) * down, b + (d - b) * down);
+
+    const float top = row_cosine_[std::size_t(cell.row)], bottom = row_cosine_[std::size_t(cell.row) + 1];
+    const float cosine = top + down * (bottom - top);
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
+    // From the left edge, at longitude +pi, to the right, and over the seam.
+    const float turns = (float(cell.column) + 0.5f + cell.across) / float(width_);
+    const V2f turn = cos_sin_turns(turns > 1.0f ? turns - 1.0f : turns);
+    const float theta = fast_atan2(sine, cosine);
+    cell.down = std::clamp(theta * kInvPi * float(height_) + 0.5f - float(cell.row), 0.0f, 1.0f);
+    radiance = radiance_in(cell);
+    pdf = pdf_in(cell, down);
+    return {sine * turn.y, cosine, -sine * turn.x};
+}
+
+}  // namespace frazil

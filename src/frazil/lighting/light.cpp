@@ -1,0 +1,122 @@
+#include "frazil/lighting/light.h"
+
+#include "frazil/base/error.h"
+
+namespace frazil {
+namespace {
+
+constexpr double kPiD = 3.14159265358979323846;
+
+void check_size(const Light& light, const char* field, float value) {
+    if (std::isfinite(value) && value > 0.0f) return;
+    throw ValueError(str(light.path, ": ", field, " must be > 0 and finite, got ", value,
+                         ". A light without a surface gives no light; enlarge it or remove it."));
+}
+
+// Area of the unit sphere times `radius` moved by the matrix: an ellipsoid. The integral over the unit sphere of
+// |det A| |A^-T n|, by the midpoint rule: exact for a sphere, spectral in azimuth.
+double ellipsoid_area(double radius, const M44f& m) {
+    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    const V3d yz = y.cross(z), zx = z.cross(x), xy = x.cross(y);
+    constexpr int kPolar = 128, kAzimuths = 128;
+    double sum = 0.0;
+    for (int i = 0; i < kPolar; ++i) {
+        const double c = (2.0 * i + 1.0) / kPolar - 1.0, s = std::sqrt(1.0 - c * c);
+        for (int j = 0; j < kAzimuths; ++j) {
+            const double phi = 2.0 * kPiD * (j + 0.5) / kAzimuths;
+            sum += (yz * (s * std::cos(phi)) + zx * (s * std::sin(phi)) + xy * c).length();
+        }
+    }
+    return 4.0 * kPiD * radius * radius * sum / (kPolar * kAzimuths);
+}
+
+// The cylinder's mantle: length times the circumference of its (elliptic) section, along a possibly skewed axis.
+double cylinder_area(const CylinderLight& cylinder, const M44f& m) {
+    const V3d axis = V3d(m[0][0], m[0][1], m[0][2]) * double(cylinder.length);
+    const V3d y = V3d(m[1][0], m[1][1], m[1][2]), z = V3d(m[2][0], m[2][1], m[2][2]);
+    constexpr int kAzimuths = 4096;
+    double sum = 0.0;
+    for (int j = 0; j < kAzimuths; ++j) {
+        const double phi = 2.0 * kPiD * (j + 0.5) / kAzimuths;
+        sum += axis.cross(z * std::cos(phi) - y * std::sin(phi)).length();
+    }
+    return 2.0 * kPiD * double(cylinder.radius) * sum / kAzimuths;
+}
+
+double cross_area(const M44f& m) {
+    return V3d(m[0][0], m[0][1], m[0][2]).cross(V3d(m[1][0], m[1][1], m[1][2])).length();
+}
+
+struct SizeFactor {
+    const M44f& m;
+    double operator()(const DomeLight&) const { return 1.0; }
+    double operator()(const DistantLight& distant) const {
+        const double half = 0.5 * double(distant.angle) * kPiD / 180.0;
+        if (half == 0.0) return 1.0;
+        const double sine2 = std::sin(half) * std::sin(half);
+        return kPiD * (half <= 0.5 * kPiD ? sine2 : 2.0 - sine2);
+    }
+    double operator()(const RectLight& rect) const { return double(rect.width) * double(rect.height) * cross_area(m); }
+    double operator()(const DiskLight& disk) const { return kPiD * disk.radius * disk.radius * cross_area(m); }
+    double operator()(const SphereLight& sphere) const { return ellipsoid_area(sphere.radius, m); }
+    double operator()(const CylinderLight& cylinder) const { return cylinder_area(cylinder, m); }
+};
+
+struct CheckShape {
+    const Light& light;
+    void operator()(const DomeLight&) const {}
+    void operator()(const DistantLight& distant) const {
+        if (distant.angle >= 0.0f && distant.angle <= 360.0f) return;
+        throw ValueError(str(light.path, ": angle must be in [0, 360] degrees, got ", distant.angle, "."));
+    }
+    void operator()(const RectLight& rect) const {
+        check_size(light, "width", rect.width);
+        check_size(light, "height", rect.height);
+    }
+    void operator()(const DiskLight& disk) const { check_size(light, "radius", disk.radius); }
+    void operator()(const SphereLight& sphere) const { check_size(light, "radius", sphere.radius); }
+    void operator()(const CylinderLight& cylinder) const {
+        check_size(light, "length", cylinder.length);
+        check_size(light, "radius", cylinder.radius);
+    }
+};
+
+}  // namespace
+
+void check_light(const Light& light) {
+    if (!is_finite(light.radiance)) {
+        throw ValueError(str(light.path, ": radiance must be finite, got (", light.radiance.x, ", ", light.radiance.y,
+                             ", ", light.radiance.z, "). Check intensity, exposure, color and colorTemperature."));
+    }
+    for (const float multiplier : light.multipliers) {
+        if (!std::isfinite(multiplier)) {
+            throw ValueError(str(light.path, ": multipliers must be finite, got ", multiplier, "."));
+        }
+    }
+    for (int i = 0; i < 4; ++i) {
+        for (int j = 0; j < 4; ++j) {
+            if (!std::isfinite(light.light_to_world[i][j])) {
+                throw ValueError(str(light.path, ": transform must be finite, got ", light.light_to_world[i][j], "."));
+            }
+        }
+    }
+    std::visit(CheckShape{light}, light.shape);
+    const M44f& m = light.light_to_world;
+    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    const double volume = std::abs(x.cross(y).dot(z));
+    if (!(volume > 1e-12 * x.length() * y.length() * z.length())) {
+        throw ValueError(
+            str(light.path, ": transform must be invertible, got determinant ", volume, ". Remove the zero scale."));
+    }
+}
+
+double size_factor(const Light& light) {
+    return std::visit(SizeFactor{light.light_to_world}, light.shape);
+}
+
+Rgb emitted_radiance(const Light& light) {
+    if (!light.normalize) return light.radiance;
+    return light.radiance * static_cast<float>(1.0 / size_factor(light));
+}
+
+}  // namespace frazil

@@ -1,0 +1,119 @@
+// One light in world space: directions towards it with their densities, and what a ray sees of it.
+// Model: rect by its solid angle [Urena2013], sphere by its cone of directions [PBRT4, Section 12.2], disk by area,
+//   cylinder by the angle across and its length, distant uniform in its cone, dome by its image. Sheared or unevenly
+//   scaled shapes are sampled in the frame where they are not, and the density follows the map.
+// Units: pdf per steradian.
+// Valid: any light that check_light accepts; the density of intersect() is that of sample().
+// Not: the choice among lights (light_sampling.h).
+#pragma once
+
+#include <limits>
+#include <span>
+#include <variant>
+
+#include "frazil/base/vec.h"
+#include "frazil/lighting/light.h"
+
+namespace frazil {
+
+struct LightSample {
+    V3f direction = V3f(0.0f);                                // unit length, from the shading point to the light
+    float distance = std::numeric_limits<float>::infinity();  // where a shadow ray must end (a hair less)
+    Rgb radiance = Rgb(0.0f);                                 // towards the point, component multipliers not applied
+    float pdf = 0.0f;                                         // per steradian, the pick included; 0 = no sample
+    bool is_delta = false;  // parallel light: radiance is irradiance at normal incidence, pdf the pick's probability
+    int light = -1;
+};
+
+// What a ray sees of a light that it runs into.
+struct LightHit {
+    Rgb radiance = Rgb(0.0f);
+    float pdf = 0.0f;  // density with which sample() would have chosen this direction
+    float distance = std::numeric_limits<float>::infinity();
+    int light = -1;
+};
+
+class WorldLight {
+  public:
+    // ValueError where check_light refuses the light.
+    explicit WorldLight(const Light& light);
+
+    // out[i] from u[i]; the pdf has no pick and `light` stays -1. Samples towards one point share its set-up.
+    void sample(const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
+
+    // False where the ray misses, or meets the light at or beyond t_max or from its dark side.
+    bool intersect(const V3f& origin, const V3f& direction, float t_max, LightHit& hit) const;
+
+    // An estimate of the absolute irradiance at a point, for the choice among lights; 0 only where no light arrives.
+    float importance(const V3f& position) const;
+
+    bool is_dome() const { return std::holds_alternative<Dome>(shape_); }
+    // A uniform dome: cosine-weighted directions serve it best.
+    bool is_uniform_dome() const;
+    // Radiance of a dome in a direction, and the density with which sample() chooses it; only where is_dome().
+    Rgb dome_radiance(const V3f& direction) const;
+    Rgb dome_radiance(const V3f& direction, float& pdf) const;
+
+  private:
+    struct Dome {
+        std::shared_ptr<const Environment> image;
+        V3f x, y, z;  // orthonormal axes in the world
+    };
+    struct Distant {
+        V3f axis;    // towards the light
+        float cap;   // 1 - cos(half angle); 0 = parallel
+        float size;  // projected solid angle, for importance
+    };
+    struct Rect {
+        V3f center, normal;   // normal on the side that shines
+        V3f x, y;             // unit axes
+        float width, height;  // in metres
+        M44f world_to_local;  // rotation (and shear) about `center` into the frame (x, y, normal)
+        float shear;          // |det| of (x, y, normal); 1 for a true rectangle
+    };
+    struct Disk {
+        V3f center, normal, x, y;  // semi-axes
+        float area;
+        M44f world_to_local;  // into the frame (x, y, normal)
+    };
+    struct Sphere {
+        V3f center;
+        M44f local_to_world, world_to_local;  // to and from the unit sphere, translation left out
+        float scale;                          // cube root of |det local_to_world|
+    };
+    struct Cylinder {
+        V3f center;
+        M44f local_to_world, world_to_local;  // to and from length 1 and radius 1 along x, translation left out
+        float scale;
+    };
+    // What importance() needs of a light with a surface.
+    struct Extent {
+        V3f center;
+        float radius = 0.0f, projected_area = 0.0f;
+        V3f normal = V3f(0.0f);  // zero = shines to all sides
+    };
+    class Builder;
+
+    void sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
+    void sample_from(const Distant& distant, const V3f& position, std::span<const V2f> u,
+                     std::span<LightSample> out) const;
+    void sample_from(const Rect& rect, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
+    void sample_from(const Disk& disk, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
+    void sample_from(const Sphere& sphere, const V3f& position, std::span<const V2f> u,
+                     std::span<LightSample> out) const;
+    void sample_from(const Cylinder& cylinder, const V3f& position, std::span<const V2f> u,
+                     std::span<LightSample> out) const;
+    bool hit_by(const Dome& dome, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const Distant& distant, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const Rect& rect, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const Disk& disk, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const Sphere& sphere, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const Cylinder& cylinder, const V3f& origin, const V3f& direction, LightHit& hit) const;
+
+    Rgb radiance_;
+    float brightness_;  // absolute luminance
+    Extent extent_;
+    std::variant<Dome, Distant, Rect, Disk, Sphere, Cylinder> shape_;
+};
+
+}  // namespace frazil

@@ -1,0 +1,130 @@
+#include "frazil/render/bodies.h"
+
+#include <array>
+#include <map>
+
+#include "frazil/base/error.h"
+#include "frazil/points/poisson.h"
+#include "frazil/render/stopwatch.h"
+
+namespace frazil {
+namespace {
+
+constexpr double kPointsOfDefaultSpacing = 1e6;
+constexpr double kPointDensity = 0.7;  // points per area / spacing² that maximal Poisson-disk sampling gives
+
+// Lengths and angles of the matrix's axes: equal for matrices that differ by a rotation, reflection or move.
+std::array<float, 6> metric(const M44f& m) {
+    const V3f x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    return {x.dot(x), y.dot(y), z.dot(z), x.dot(y), y.dot(z), z.dot(x)};
+}
+
+bool is_same_metric(const std::array<float, 6>& a, const std::array<float, 6>& b) {
+    const float scale = a[0] + a[1] + a[2];
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        if (std::abs(a[i] - b[i]) > 1e-5f * scale) return false;
+    }
+    return true;
+}
+
+PointSet moved(const PointSet& points, const M44f& rigid) {
+    PointSet result = points;
+    const M44f inverse = rigid.inverse();
+    for (V3f& position : result.positions) position = position * rigid;
+    for (V3f& normal : result.normals) normal = transform_normal(normal, inverse);
+    return result;
+}
+
+// A point set in the world, and the placement that it was made for.
+struct SharedPoints {
+    float spacing;
+    M44f local_to_world;
+    PointSet points;
+};
+
+// The points of an object, taken from another placement of the same mesh where that is the same but for a rigid motion.
+PointSet points_of(const Object& object, const Mesh& world_mesh, float spacing, std::uint32_t seed,
+                   std::multimap<std::uint32_t, SharedPoints>& shared, Progress* progress) {
+    const auto [begin, end] = shared.equal_range(object.mesh);
+    for (auto it = begin; it != end; ++it) {
+        const SharedPoints& other = it->second;
+        if (other.spacing == spacing && is_same_metric(metric(other.local_to_world), metric(object.local_to_world))) {
+            return moved(other.points, other.local_to_world.inverse() * object.local_to_world);
+        }
+    }
+    PoissonOptions options;
+    options.seed = seed;
+    const PointSet points = poisson_points(world_mesh, spacing, options, progress);
+    shared.emplace(object.mesh, SharedPoints{spacing, object.local_to_world, points});
+    return points;
+}
+
+}  // namespace
+
+float point_spacing(const IceMaterial& material, double area, const RenderOptions& options) {
+    float spacing = options.spacing;
+    if (spacing == 0.0f) spacing = material.spacing;
+    if (spacing == 0.0f) {
+        const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
+        const double finest = std::sqrt(kPointDensity * area / kPointsOfDefaultSpacing);
+        spacing = std::max(1.0f / max_component(sigma_t_prime), static_cast<float>(finest));
+    }
+    return spacing * options.spacing_scale;
+}
+
+std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene, const RayScene& ray_scene,
+                                               const LightSampler& lights, const RenderOptions& options,
+                                               RenderStats& stats, Progress* progress) {
+    std::vector<std::unique_ptr<Body>> bodies(scene.objects.size());
+    std::multimap<std::uint32_t, SharedPoints> shared;
+    std::map<float, std::shared_ptr<const DielectricAlbedo>> boundaries;  // by eta
+    const std::vector<std::string> groups = light_groups(scene.lights);
+
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        const Object& object = scene.objects[i];
+        const auto* material = std::get_if<IceMaterial>(&scene.materials[object.material].model);
+        if (!material) continue;
+        auto body = std::make_unique<Body>();
+        body->material = material;
+        auto& boundary = boundaries[material->medium.eta];
+        if (!boundary) boundary = std::make_shared<DielectricAlbedo>(material->medium.eta);
+        body->boundary = boundary;
+        const Profile profile = Dipole(material->medium);
+        body->total_reflectance = albedo(profile);
+
+        const Mesh world_mesh = transformed(scene.meshes[object.mesh], object.local_to_world);
+        const double area = surface_area(world_mesh);
+        if (area > 0.0) {
+            try {
+                Stopwatch points_watch(stats.seconds["points"]);
+                const float spacing = point_spacing(*material, area, options);
+                const PointSet points = points_of(object, world_mesh, spacing, options.seed, shared, progress);
+                points_watch.stop();
+
+                // What the boundary reflects does not enter.
+                Stopwatch bake_watch(stats.seconds["bake"]);
+                const float alpha = alpha_from_roughness(material->roughness.value);
+                const auto transmittance = [&](float cos_theta) {
+                    return 1.0f - material->specular * boundary->eval(cos_theta, alpha);
+                };
+                Irradiance irradiance = bake_irradiance(points, ray_scene, lights, transmittance,
+                                                        {options.bake_samples, options.seed}, progress);
+                bake_watch.stop();
+                stats.bake_rays += irradiance.rays;
+                stats.dropped_samples += irradiance.dropped_samples;
+
+                Stopwatch tree_watch(stats.seconds["tree"]);
+                body->tree = std::make_unique<const PointTree>(points, std::move(irradiance.values), irradiance.groups,
+                                                               profile, material->ramp);
+                stats.points += body->tree->point_count();
+                stats.nodes += body->tree->node_count();
+            } catch (const ValueError& error) {
+                throw ValueError(str(object.path, ": ", error.what()));
+            }
+        }
+        bodies[i] = std::move(body);
+    }
+    return bodies;
+}
+
+}  // namespace frazil

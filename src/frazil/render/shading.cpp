@@ -1,0 +1,38 @@
+#include "frazil/render/shading.h"
+
+#include <tuple>
+
+namespace frazil {
+
+Shader::Shader(const Surface& surface, const Body* body)
+    : geometric_normal_(surface.geometric_normal), normal_(surface.normal), body_(body) {
+    std::tie(tangent_, bitangent_) = tangent_frame(normal_);
+    if (body_) {
+        alpha_ = alpha_from_roughness(eval_float(body_->material->roughness, surface.st));
+    } else {
+        const auto& material = std::get<StandardMaterial>(surface.material->model);
+        standard_.emplace(material, surface.st, surface.display_color);
+    }
+}
+
+Scattering Shader::eval(const V3f& wo, const V3f& wi) const {
+    if (geometric_normal_.dot(wi) <= 0.0f) return {};
+    const V3f local_wo = to_local(wo), local_wi = to_local(wi);
+    if (local_wi.z <= 0.0f) return {};
+    if (standard_) {
+        const BsdfValue value = standard_->eval(local_wo, local_wi);
+        return {value.diffuse, value.specular, standard_->pdf(local_wo, local_wi)};
+    }
+    const float reflection = dielectric_reflection(local_wo, local_wi, alpha_, *body_->boundary);
+    return {Rgb(0.0f), Rgb(body_->material->specular * reflection), ggx_pdf(local_wo, local_wi, alpha_)};
+}
+
+bool Shader::sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const {
+    const V3f local_wo = to_local(wo);
+    const V3f local_wi = standard_ ? standard_->sample(local_wo, u_lobe, u).wi : ggx_sample(local_wo, alpha_, u);
+    if (!(local_wi.z > 0.0f)) return false;
+    wi = to_world(local_wi);
+    return geometric_normal_.dot(wi) > 0.0f;
+}
+
+}  // namespace frazil

@@ -1,0 +1,45 @@
+// How a surface scatters light: one face over the material models.
+// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection alone (its core answers by gather).
+// Units: f * cos per steradian.
+// Valid: reflection only: zero where a direction is below the geometric surface.
+#pragma once
+
+#include <optional>
+
+#include "frazil/material/standard.h"
+#include "frazil/render/bodies.h"
+#include "frazil/render/surface.h"
+
+namespace frazil {
+
+// f * cos of the lobes of one pair of directions, and the density with which sample() would choose wi.
+struct Scattering {
+    Rgb diffuse = Rgb(0.0f), specular = Rgb(0.0f);
+    float pdf = 0.0f;
+};
+
+// The scattering of one surface, directions in world space.
+class Shader {
+  public:
+    // `body` is the surface's translucent body, null for other materials.
+    Shader(const Surface& surface, const Body* body);
+
+    // The fraction of light that the surface stops: 1 but for cut-out standard materials.
+    float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
+    Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
+
+    Scattering eval(const V3f& wo, const V3f& wi) const;
+    // False where the sample is lost.
+    bool sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const;
+
+  private:
+    V3f to_local(const V3f& v) const { return {v.dot(tangent_), v.dot(bitangent_), v.dot(normal_)}; }
+    V3f to_world(const V3f& v) const { return tangent_ * v.x + bitangent_ * v.y + normal_ * v.z; }
+
+    V3f geometric_normal_, normal_, tangent_, bitangent_;
+    std::optional<StandardBsdf> standard_;
+    const Body* body_ = nullptr;
+    float alpha_ = 0.0f;  // of the ice's boundary
+};
+
+}  // namespace frazil

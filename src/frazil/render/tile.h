@@ -1,0 +1,84 @@
+// The sums of one tile of pixels while its samples are traced.
+// Model: additive light is summed per pixel, component and light group; utility AOVs beside it. A contribution that is
+//   not finite is dropped and counted. One tile belongs to one thread.
+// Units: radiance.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "frazil/base/vec.h"
+
+namespace frazil {
+
+// The additive rows of the AOV table, in its order.
+enum class Component { translucency, diffuse, specular, emission, background };
+inline constexpr std::size_t kComponentCount = 5;
+
+// What the camera sees first along one sample.
+struct PrimaryHit {
+    float depth = std::numeric_limits<float>::infinity();
+    V3f position = V3f(0.0f), normal = V3f(0.0f);
+    std::uint32_t object_id = 0;
+};
+
+// Exitance wanted at a place on ice, and what becomes of it.
+struct GatherRequest {
+    std::uint32_t object = 0;
+    std::uint32_t pixel = 0;
+    bool is_primary = false;  // then `weight` is to translucency, else the light goes the way of its first reflection
+    V3f position = V3f(0.0f);
+    Rgb weight = Rgb(0.0f), specular_weight = Rgb(0.0f);  // to translucency or diffuse; to specular
+    // Light that enters right here, for the compensation that fills up; its light group.
+    Rgb entering = Rgb(0.0f);
+    std::uint32_t entering_group = 0;
+};
+
+class Tile {
+  public:
+    Tile(std::size_t pixels, std::size_t groups)
+        : groups_(groups),
+          light_(pixels * kComponentCount * groups, Rgb(0.0f)),
+          normal_(pixels, V3f(0.0f)),
+          coverage_(pixels, Rgb(0.0f)),
+          hits_(pixels),
+          nearest_(pixels) {}
+
+    void add(std::size_t pixel, Component component, std::size_t group, const Rgb& radiance) {
+        if (!is_finite(radiance)) {
+            ++dropped_samples;
+            return;
+        }
+        light_[(pixel * kComponentCount + static_cast<std::size_t>(component)) * groups_ + group] += radiance;
+    }
+
+    void add_primary(std::size_t pixel, const PrimaryHit& hit) {
+        normal_[pixel] += hit.normal;
+        ++hits_[pixel];
+        if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
+    }
+
+    void add_coverage(std::size_t pixel, const Rgb& coverage) { coverage_[pixel] += coverage; }
+
+    const Rgb& light(std::size_t pixel, std::size_t component, std::size_t group) const {
+        return light_[(pixel * kComponentCount + component) * groups_ + group];
+    }
+    const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
+    const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
+    std::uint32_t hits(std::size_t pixel) const { return hits_[pixel]; }
+    const PrimaryHit& nearest(std::size_t pixel) const { return nearest_[pixel]; }
+
+    std::vector<GatherRequest> requests;
+    std::uint64_t rays = 0, dropped_samples = 0;
+
+  private:
+    std::size_t groups_;
+    std::vector<Rgb> light_;
+    std::vector<V3f> normal_;
+    std::vector<Rgb> coverage_;
+    std::vector<std::uint32_t> hits_;
+    std::vector<PrimaryHit> nearest_;
+};
+
+}  // namespace frazil

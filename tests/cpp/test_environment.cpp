@@ -1,0 +1,108 @@
+// The lat-long image: orientation, density, refusals.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "chi_square.h"
+#include "frazil/base/error.h"
+#include "frazil/lighting/environment.h"
+
+using namespace frazil;
+
+namespace {
+
+constexpr double kPiD = 3.14159265358979323846;
+
+Environment gradient(int width, int height) {
+    std::vector<Rgb> pixels(std::size_t(width * height));
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            pixels[std::size_t(y * width + x)] =
+                Rgb(float(x * x), float(y), 1.0f) * (x > width / 2 && y > height / 2 ? 0.0f : 1.0f);
+        }
+    }
+    return Environment(width, height, pixels, "/env");
+}
+
+}  // namespace
+
+TEST_CASE("environment: row 0 is +y, the centre +z, +x a quarter left of it, the edges -z") {
+    // An image whose pixel holds its own column and row.
+    constexpr int kWidth = 64, kHeight = 32;
+    std::vector<Rgb> pixels;
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) pixels.emplace_back(float(x) + 0.5f, float(y) + 0.5f, 0.0f);
+    }
+    const Environment env(kWidth, kHeight, pixels, "/env");
+    CHECK(env.eval(V3f(0, 0, 1)).x == doctest::Approx(32));
+    CHECK(env.eval(V3f(0, 0, 1)).y == doctest::Approx(16));
+    CHECK(env.eval(V3f(1, 0, 0)).x == doctest::Approx(16));
+    CHECK(env.eval(V3f(-1, 0, 0)).x == doctest::Approx(48));
+    CHECK(env.eval(V3f(0, 1, 0)).y == doctest::Approx(0.5));
+    CHECK(env.eval(V3f(0, -1, 0)).y == doctest::Approx(31.5));
+    CHECK(env.eval(V3f(0, 0.7071f, 0.7071f)).y == doctest::Approx(8));
+    // The seam at -z is blended: half of the first and half of the last column.
+    CHECK(env.eval(V3f(0, 0, -1)).x == doctest::Approx(32));
+}
+
+TEST_CASE("environment: pdf integrates to 1 and is the density of sample()") {
+    for (const auto& [width, height] : {std::pair{48, 24}, {1, 1}, {5, 3}, {2, 40}}) {
+        const Environment env = gradient(width, height);
+        const auto sample = [&](const V2f& u, V3f& d) {
+            float pdf;
+            d = env.sample(u, pdf);
+            return pdf > 0.0f;
+        };
+        const auto result = test::chi_square(
+            sample, [&](const V3f& d) { return double(env.pdf(d)); }, V3f(0, 1, 0));
+        CAPTURE(width);
+        CHECK(result.mass == doctest::Approx(1.0).epsilon(5e-3));
+        CHECK(result.hit_rate == 1.0);
+        CHECK(result.p_value > 1e-4);
+    }
+}
+
+TEST_CASE("environment: wherever there is light there is density, beside a bright pixel too") {
+    std::vector<Rgb> pixels(16 * 8, Rgb(0.0f));
+    pixels[3 * 16 + 15] = Rgb(0.0f, 0.0f, 1000.0f);
+    const Environment env(16, 8, pixels, "/env");
+    double integral = 0.0, estimate = 0.0;
+    constexpr int kSteps = 512;
+    for (int i = 0; i < kSteps; ++i) {
+        for (int j = 0; j < 2 * kSteps; ++j) {
+            const double y = 1.0 - (i + 0.5) * 2.0 / kSteps, phi = kPiD * (j + 0.5) / kSteps, s = std::sqrt(1 - y * y);
+            const V3f d(float(s * std::sin(phi)), float(y), float(s * std::cos(phi)));
+            const double value = env.eval(d).z;
+            if (value > 0.0) REQUIRE(env.pdf(d) > 0.0f);
+            integral += value * 4.0 * kPiD / (2.0 * kSteps * kSteps);
+        }
+    }
+    constexpr std::uint32_t kCount = 1 << 14;
+    for (std::uint32_t i = 0; i < kCount; ++i) {
+        float pdf;
+        Sampler sampler(1, 2, i);
+        const V3f d = env.sample(sampler.next_2d(), pdf);
+        estimate += double(env.eval(d).z) / double(pdf) / kCount;
+    }
+    CHECK(estimate == doctest::Approx(integral).epsilon(5e-3));
+    CHECK(env.average().z * 4 * kPiD == doctest::Approx(integral).epsilon(0.02));
+}
+
+TEST_CASE("environment: black and negative images still sample; broken ones are refused") {
+    const Environment black(8, 4, std::vector<Rgb>(32, Rgb(0.0f)), "/env");
+    float pdf = 0.0f;
+    black.sample(V2f(0.3f, 0.9f), pdf);
+    CHECK(pdf == doctest::Approx(1.0 / (4 * kPiD)).epsilon(1e-3));
+    const Environment negative(8, 4, std::vector<Rgb>(32, Rgb(-1.0f)), "/env");
+    CHECK(negative.average().x == doctest::Approx(-1.0));
+    negative.sample(V2f(0.0f, 0.99999994f), pdf);
+    CHECK(pdf > 0.0f);
+
+    std::vector<Rgb> broken(32, Rgb(1.0f));
+    broken[9].y = NAN;
+    CHECK_THROWS_WITH_AS(Environment(8, 4, broken, "/sky"), doctest::Contains("/sky: pixels must be finite"),
+                         ValueError);
+    CHECK_THROWS_WITH_AS(Environment(8, 4, broken, "/sky"), doctest::Contains("column 1, row 1"), ValueError);
+    CHECK_THROWS_WITH_AS(Environment(8, 5, broken, "/sky"), doctest::Contains("got 8 x 5 with 32 pixels"), ValueError);
+    CHECK_THROWS_AS(Environment(0, 0, {}, "/sky"), ValueError);
+}

@@ -1,0 +1,197 @@
+"""Lights: shapes, radiance, multipliers, groups, dome images and their orientation."""
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from pxr import Gf, Sdf, UsdGeom, UsdLux
+from test_usd_materials import write_image
+from usd_stages import add_quad, load, new_stage
+
+
+@pytest.fixture
+def stage(tmp_path):
+    stage = new_stage(tmp_path / "s.usda", meters_per_unit=0.01)
+    add_quad(stage, "/Quad")
+    stage.RemovePrim("/Dome")
+    return stage
+
+
+def read_light(stage):
+    scene = load(stage)
+    assert scene.warnings == []
+    (light,) = scene.lights
+    return light
+
+
+def test_radiance_is_the_product_of_its_inputs(stage):
+    light = UsdLux.RectLight.Define(stage, "/Light")
+    light.CreateWidthAttr(20)
+    light.CreateHeightAttr(30)
+    light.CreateIntensityAttr(3)
+    light.CreateExposureAttr(2)
+    light.CreateColorAttr(Gf.Vec3f(1, 0.5, 0.25))
+    light.CreateNormalizeAttr(True)
+    light.CreateDiffuseAttr(0.5)
+    light.CreateSpecularAttr(0.25)
+    light.GetPrim().CreateAttribute("inputs:frazil:translucency", Sdf.ValueTypeNames.Float).Set(2.0)
+    light.GetPrim().CreateAttribute("frazil:lightGroup", Sdf.ValueTypeNames.Token).Set("rim")
+    light.AddTranslateOp().Set(Gf.Vec3d(100, 0, 0))
+    read = read_light(stage)
+    np.testing.assert_allclose(read.radiance, [12, 6, 3])
+    assert (read.shape.width, read.shape.height) == (20, 30)
+    assert read.normalize
+    assert (read.diffuse, read.specular, read.translucency) == (0.5, 0.25, 2.0)
+    assert read.group == "rim"
+    np.testing.assert_allclose(read.matrix[3, :3], [1, 0, 0], rtol=1e-6)
+    np.testing.assert_allclose(read.matrix[0, 0], 0.01, rtol=1e-6)
+
+
+def test_color_temperature(stage):
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    light.CreateColorTemperatureAttr(3000)
+    np.testing.assert_allclose(read_light(stage).radiance, [1, 1, 1])
+    light.CreateEnableColorTemperatureAttr(True)
+    expected = np.array(UsdLux.BlackbodyTemperatureAsRgb(3000))
+    read = read_light(stage).radiance
+    np.testing.assert_allclose(read, expected, rtol=1e-5)
+    assert read[0] > read[2]
+
+
+@pytest.mark.parametrize(
+    ("kind", "sizes"),
+    [
+        ("DistantLight", {"angle": 2.0}),
+        ("DiskLight", {"radius": 3.0}),
+        ("SphereLight", {"radius": 4.0}),
+        ("CylinderLight", {"length": 5.0, "radius": 0.25}),
+    ],
+)
+def test_shapes(stage, kind, sizes):
+    prim = stage.DefinePrim("/Light", kind)
+    for name, value in sizes.items():
+        prim.GetAttribute(f"inputs:{name}").Set(value)
+    light = read_light(stage)
+    assert type(light.shape).__name__ == kind
+    for name, value in sizes.items():
+        assert getattr(light.shape, name) == pytest.approx(value)
+
+
+def test_distant_lights_keep_their_default_intensity(stage):
+    UsdLux.DistantLight.Define(stage, "/Light")
+    np.testing.assert_allclose(read_light(stage).radiance, 50000)
+
+
+def dome_with_a_spot(stage, tmp_path, row, column, kind="DomeLight"):
+    pixels = np.zeros((16, 32, 3), np.float32)
+    pixels[row, column] = 100.0
+    write_image(tmp_path / "sky.exr", pixels, oiio.FLOAT)
+    prim = stage.DefinePrim("/Sky", kind)
+    prim.GetAttribute("inputs:texture:file").Set(str(tmp_path / "sky.exr"))
+    return prim
+
+
+def brightest_world_direction(light):
+    around = np.linspace(-np.pi, np.pi, 181)
+    directions = [
+        (np.sin(p) * np.cos(t), np.cos(p), np.sin(p) * np.sin(t))
+        for p in np.linspace(0.01, np.pi - 0.01, 91)
+        for t in around
+    ]
+    values = [light.shape.radiance(d)[0] for d in directions]
+    local = np.array(directions[int(np.argmax(values))])
+    return local @ light.matrix[:3, :3]
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "expected"),
+    [(0, 5, (0, 1, 0)), (15, 5, (0, -1, 0)), (8, 16, (0, 0, 1)), (8, 8, (1, 0, 0)), (8, 24, (-1, 0, 0))],
+)
+def test_dome_images_follow_the_lat_long_convention(stage, tmp_path, row, column, expected):
+    dome_with_a_spot(stage, tmp_path, row, column)
+    np.testing.assert_allclose(brightest_world_direction(read_light(stage)), expected, atol=0.15)
+
+
+def test_a_dome_of_a_z_up_stage(stage, tmp_path):
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    prim = dome_with_a_spot(stage, tmp_path, 0, 5)
+    # UsdLuxDomeLight: the pole is the stage's +y, which is the world's -z
+    np.testing.assert_allclose(brightest_world_direction(read_light(stage)), (0, 0, -1), atol=0.15)
+    UsdLux.DomeLight(prim).OrientToStageUpAxis()
+    np.testing.assert_allclose(brightest_world_direction(read_light(stage)), (0, 1, 0), atol=0.15)
+    stage.RemovePrim("/Sky")
+    # UsdLuxDomeLight_1: poleAxis 'scene' by default
+    dome_with_a_spot(stage, tmp_path, 0, 5, "DomeLight_1")
+    np.testing.assert_allclose(brightest_world_direction(read_light(stage)), (0, 1, 0), atol=0.15)
+
+
+@pytest.mark.parametrize("problem", ["missing", "broken", "mirroredBall", "nan"])
+def test_dome_images_that_cannot_be_used(stage, tmp_path, problem):
+    prim = dome_with_a_spot(stage, tmp_path, 0, 0)
+    if problem == "missing":
+        prim.GetAttribute("inputs:texture:file").Set("./nowhere.exr")
+    elif problem == "broken":
+        (tmp_path / "sky.exr").write_bytes(b"v/1\x01")
+    elif problem == "nan":
+        write_image(tmp_path / "sky.exr", np.full((2, 4, 3), np.nan), oiio.FLOAT)
+    else:
+        prim.GetAttribute("inputs:texture:format").Set("mirroredBall")
+    scene = load(stage)
+    assert len(scene.lights) == 1
+    assert scene.lights[0].shape.has_image == (problem == "nan")
+    assert len(scene.warnings) == 1
+    assert scene.warnings[0].startswith("/Sky: ")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value", "said"),
+    [
+        ("SphereLight", "radius", 0.0, "radius must be > 0, got 0.0"),
+        ("RectLight", "width", -1.0, "width must be > 0, got -1.0"),
+        ("SphereLight", "intensity", float("inf"), "intensity times color must be finite"),
+        ("PortalLight", None, None, "lights of type PortalLight are not supported"),
+    ],
+)
+def test_lights_that_cannot_be_used_are_left_out(stage, kind, name, value, said):
+    UsdLux.DistantLight.Define(stage, "/Sun")
+    prim = stage.DefinePrim("/Light", kind)
+    if name:
+        prim.GetAttribute(f"inputs:{name}").Set(value)
+    scene = load(stage)
+    assert [light.path for light in scene.lights] == ["/Sun"]
+    assert any(w.startswith("/Light: ") and said in w for w in scene.warnings), scene.warnings
+
+
+def test_flattened_lights_are_left_out(stage):
+    UsdLux.DistantLight.Define(stage, "/Sun")
+    UsdLux.DiskLight.Define(stage, "/Light").AddScaleOp().Set(Gf.Vec3f(1, 0, 1))
+    scene = load(stage)
+    assert [light.path for light in scene.lights] == ["/Sun"]
+    assert "/Light: its transform cannot be inverted" in scene.warnings[0]
+
+
+def test_what_lights_do_not_support_is_named(stage):
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    UsdLux.ShapingAPI.Apply(light.GetPrim()).CreateShapingConeAngleAttr(30)
+    UsdLux.ShadowAPI.Apply(light.GetPrim()).CreateShadowEnableAttr(False)
+    light.GetPrim().CreateRelationship("light:filters").SetTargets(["/Filter"])
+    UsdLux.LightAPI(light.GetPrim()).GetLightLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Quad"])
+    said = " ".join(load(stage).warnings)
+    for word in ("shaping:cone:angle", "shadow:enable", "light filters", "lightLink"):
+        assert word in said
+
+
+def test_invisible_lights_are_off(stage):
+    UsdLux.DistantLight.Define(stage, "/Sun")
+    UsdLux.SphereLight.Define(stage, "/Light").MakeInvisible()
+    assert [light.path for light in load(stage).lights] == ["/Sun"]
+
+
+def test_lights_inside_point_instancers_are_placed(stage):
+    instancer = UsdGeom.PointInstancer.Define(stage, "/Points")
+    instancer.CreatePositionsAttr([Gf.Vec3f(0), Gf.Vec3f(100, 0, 0)])
+    instancer.CreateProtoIndicesAttr([0, 0])
+    UsdLux.SphereLight.Define(stage, "/Points/Bulb")
+    instancer.CreatePrototypesRel().SetTargets(["/Points/Bulb"])
+    scene = load(stage)
+    assert [light.path for light in scene.lights] == ["/Points[0]/Bulb", "/Points[1]/Bulb"]
+    np.testing.assert_allclose(scene.lights[1].matrix[3, :3], [1, 0, 0], rtol=1e-6)
