@@ -6,6 +6,8 @@ BUILD      ?= build/venv
 JOBS       ?= $(shell nproc)
 RESOLUTION ?= 960x540
 SAMPLES    ?= 32
+# Of the example's meshes: finer above 1. A scene that is there already for this detail is left as it is.
+DETAIL     ?= 1.0
 OUT        ?= out
 
 STAMPS := $(VENV)/stamps
@@ -24,7 +26,7 @@ PYTHON_SOURCES := $(shell find python -name '*.py' -o -name '*.pyi' -o -name 'py
 SOURCE_FOLDERS := $(shell find src python -type d -not -name __pycache__)
 CPP_TESTS      := $(shell find tests/cpp -name '*.cpp' -o -name '*.h') tests/cpp
 PIP_INSTALL    := pip install -q --disable-pip-version-check
-CMAKE_CONFIG   := -Cbuild-dir=$(BUILD) -Ccmake.define.FRAZIL_BUILD_TESTS=ON
+CMAKE_CONFIG   := -C build-dir=$(BUILD) -C cmake.define.FRAZIL_BUILD_TESTS=ON
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build render test quick test-cpp sanitize lint format stubs wheel check-wheel clean distclean
@@ -33,7 +35,7 @@ CMAKE_CONFIG   := -Cbuild-dir=$(BUILD) -Ccmake.define.FRAZIL_BUILD_TESTS=ON
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 	@echo
-	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
+	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) DETAIL=$(DETAIL) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
 
 # ---- set-up ---------------------------------------------------------------------------------------------------------
 
@@ -72,12 +74,9 @@ build: $(STAMPS)/package ## Build and install the package into .venv
 
 # ---- render ---------------------------------------------------------------------------------------------------------
 
-$(OUT)/glacier.usda: $(wildcard examples/*.py) $(STAMPS)/runtime
+render: $(STAMPS)/package ## Render the example scene: RESOLUTION=960x540 SAMPLES=32
 	@mkdir -p $(OUT)
-	@python examples/glacier.py -o $@
-	@touch $@
-
-render: $(STAMPS)/package $(OUT)/glacier.usda ## Render the example scene: RESOLUTION=960x540 SAMPLES=32
+	@python examples/glacier.py -o $(OUT)/glacier.usda --detail $(DETAIL)
 	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES)
 
 # ---- test -----------------------------------------------------------------------------------------------------------

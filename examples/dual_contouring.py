@@ -13,13 +13,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 Field = Callable[[np.ndarray], np.ndarray]
 
 kLipschitz = 1.3  # how steep a field may be before a block that it crosses can be overlooked
 kBlock, kSubBlock = 12, 2  # cells along the edge of a block that is skipped as a whole where the field is large
-kRegularization = 0.03  # pull of a cell's vertex towards the mean of its crossings
+kRegularization = 0.005  # pull of a cell's vertex towards the mean of its crossings
+kSharp = 0.7  # share of a full turn that the angles around a tip may have
 kChunk = 1 << 15  # points per call of the field
 
 
@@ -35,11 +38,23 @@ class Surface:
         a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
         return _normalized(_sum_at(self.triangles, np.repeat(np.cross(b - a, c - a), 3, 0), len(self.positions)))
 
+    def largest_piece(self) -> "Surface":
+        """The connected piece with the most triangles: without the crumbs where thin tips slip through the grid."""
+        links = coo_matrix((np.ones(len(self.triangles)), (self.triangles[:, 0], self.triangles[:, 1])))
+        links.resize((len(self.positions),) * 2)
+        _, piece = connected_components(links, directed=False)
+        kept = piece == np.bincount(piece[self.triangles[:, 0]]).argmax()
+        return Surface(self.positions[kept], (np.cumsum(kept) - 1)[self.triangles[kept[self.triangles[:, 0]]]])
+
     def sharpen(self, tips: np.ndarray, reach: float) -> None:
-        """Pull the vertex nearest to each of the tips (K, 3) onto it, where there is one within `reach`."""
+        """Pull the vertex nearest to each of the tips (K, 3) onto it, where that is within `reach` and makes a tip."""
         distance, nearest = cKDTree(self.positions).query(tips)
-        near = distance < reach
-        self.positions[nearest[near]] = tips[near]
+        for vertex, tip in zip(nearest[distance < reach], tips[distance < reach], strict=True):
+            fan = self.triangles[(self.triangles == vertex).any(1)]
+            ends = self.positions[fan[fan != vertex].reshape(-1, 2)] - tip
+            ends /= np.linalg.norm(ends, axis=2, keepdims=True)
+            if np.arccos(np.clip(np.sum(ends[:, 0] * ends[:, 1], 1), -1.0, 1.0)).sum() < kSharp * 2.0 * np.pi:
+                self.positions[vertex] = tip
 
 
 def contour(field: Field, lower, upper, cell: float) -> Surface:
@@ -57,13 +72,8 @@ def contour(field: Field, lower, upper, cell: float) -> Surface:
     if not inside.any() or _touches_border(inside):
         raise ValueError(f"field: surface must lie inside the box {lower.tolist()} .. {list(upper)}. Enlarge the box.")
     crossings = [_crossings(values, inside, axis) for axis in range(3)]
-
-    points, normals = [], []
-    for axis, (base, start, _) in enumerate(crossings):
-        p = lower + cell * (base + start[:, None] * np.eye(3)[axis])
-        n = _gradients(field, p, 0.12 * cell)
-        points.append(p)
-        normals.append(n)
+    points = [_refined(field, lower, cell, axis, *crossing) for axis, crossing in enumerate(crossings)]
+    normals = [_gradients(field, p, 0.05 * cell) for p in points]
     return _connect(crossings, points, normals, lower, cell, np.array(inside.shape))
 
 
@@ -127,16 +137,37 @@ def _touches_border(inside: np.ndarray) -> bool:
 
 
 def _crossings(values: np.ndarray, inside: np.ndarray, axis: int):
-    # Grid edges along the axis whose ends differ: lower end (N, 3), fraction along the edge, whether it enters.
+    # Grid edges along the axis whose ends differ: lower end (N, 3), the values at both ends, whether it leaves.
     lo = [slice(None)] * 3
     hi = [slice(None)] * 3
     lo[axis], hi[axis] = slice(None, -1), slice(1, None)
     base = np.argwhere(inside[tuple(lo)] != inside[tuple(hi)])
     end = base + np.eye(3, dtype=int)[axis]
-    a = values[tuple(base.T)].astype(np.float64)
-    b = values[tuple(end.T)].astype(np.float64)
-    fraction = np.where((a < 0) != (b < 0), a / np.where(a == b, 1.0, a - b), 0.5)
-    return base, np.clip(fraction, 0.0, 1.0), inside[tuple(base.T)]
+    return (
+        base,
+        values[tuple(base.T)].astype(np.float64),
+        values[tuple(end.T)].astype(np.float64),
+        inside[tuple(base.T)],
+    )
+
+
+def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray:
+    # The crossing of each edge by two steps of false position; the middle where filling made it up.
+    start, along = lower + cell * base, cell * np.eye(3)[axis]
+    s, t = np.zeros(len(a)), np.ones(len(a))
+    made_up = (a < 0) == (b < 0)
+
+    def point():
+        middle = np.where(made_up, 0.5, s + (t - s) * a / np.where(a == b, 1.0, a - b))
+        return middle, start + middle[:, None] * along
+
+    for _ in range(2):
+        middle, p = point()
+        value = evaluate(field, p)
+        first = (value < 0) == (a < 0)
+        s, a = np.where(first, middle, s), np.where(first, value, a)
+        t, b = np.where(first, t, middle), np.where(first, b, value)
+    return point()[1]
 
 
 def _gradients(field: Field, points: np.ndarray, step: float) -> np.ndarray:
@@ -148,7 +179,7 @@ def _gradients(field: Field, points: np.ndarray, step: float) -> np.ndarray:
 def _connect(crossings, points, normals, lower, cell, shape) -> Surface:
     # Gather the four cells around each crossed edge.
     rings = []
-    for axis, (base, _, _) in enumerate(crossings):
+    for axis, (base, *_) in enumerate(crossings):
         a, b = np.eye(3, dtype=int)[(axis + 1) % 3], np.eye(3, dtype=int)[(axis + 2) % 3]
         cells = np.stack([base - a - b, base - b, base, base - a], 1)
         rings.append(np.ravel_multi_index(np.moveaxis(cells, -1, 0), shape))
@@ -171,7 +202,7 @@ def _connect(crossings, points, normals, lower, cell, shape) -> Surface:
     positions = np.clip(positions, corner, corner + cell)
 
     # Split each quad along the diagonal whose two triangles agree better with the field's own normal.
-    entering = np.concatenate([c[2] for c in crossings])
+    entering = np.concatenate([c[3] for c in crossings])
     quad = np.where(entering[:, None], ring, ring[:, ::-1])
     first = np.stack([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]], 1)
     second = np.stack([quad[:, [1, 2, 3]], quad[:, [1, 3, 0]]], 1)

@@ -30,8 +30,8 @@ def build(path: Path, detail: float, seed: int) -> None:
     ice = IceBody(seed)
     writer = SceneWriter(path)
 
-    surface = contour(ice, kLower, kUpper, cell)
-    surface.sharpen(ice.tips, 2.5 * cell)
+    surface = contour(ice, kLower, kUpper, cell).largest_piece()
+    surface.sharpen(ice.tips, 4.0 * cell)
     normals = corner_normals(surface)
     vertex_normals = surface.vertex_normals()
     frost = ice.frost(surface.positions, vertex_normals)

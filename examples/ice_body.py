@@ -61,9 +61,15 @@ class IceBody:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """The field (N,), negative inside, at points (N, 3)."""
+        if len(points) == 0:
+            return np.zeros(0)
         p = self._bend(points)
         d, thickness = self._union(p)
         return d + self._melt(points, d, thickness)
+
+    def bare(self, points: np.ndarray) -> np.ndarray:
+        """The field (N,) of the shards and the block before anything has melted or cracked."""
+        return self._union(self._bend(points))[0] if len(points) else np.zeros(0)
 
     def frost(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """How white the ice is (N,): dusted ledges, frosted cracks, bubbly layers, thin tips."""
@@ -77,7 +83,7 @@ class IceBody:
             fan = np.clip(self.noise(points, 0.5, 60 + k) + 0.2, 0, 1)
             crack = np.maximum(crack, np.maximum(np.exp(-np.abs(side) / 0.012), fan * _one_sided(side, 0.14)))
         bubbles = np.clip(self._layer(p) * 1.3 - 0.2, 0, 1) * np.clip(0.35 + self.noise(p, 0.7, 85), 0, 1) * 0.5
-        thin = np.clip(1.0 - thickness / 0.10, 0, 1) * 0.55
+        thin = np.clip(1.0 - thickness / 0.20, 0, 1) * 0.75
         mottle = np.clip(self.noise.fractal(points, 0.5, 4, 80) - 0.1, 0, 1) * 0.5
         white = 1.0 - (1.0 - 0.9 * dust) * (1.0 - 0.85 * crack) * (1.0 - bubbles) * (1.0 - thin) * (1.0 - mottle)
         return np.clip(white, 0.0, 1.0)

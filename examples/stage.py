@@ -16,10 +16,10 @@ from sky import write_image
 kStampKey = "glacier:madeFrom"
 
 # Ice with bubbles; absorption of pure ice times about eight, as two metres have to show what a glacier shows in twenty.
-kIceScattering = (16.0, 16.0, 16.0)
-kIceAbsorption = (3.2, 0.55, 0.16)
-kClearTint = np.array([0.60, 0.90, 1.02])
-kWhiteTint = np.array([1.75, 1.25, 1.08])
+kIceScattering = (20.0, 20.0, 20.0)
+kIceAbsorption = (2.4, 0.40, 0.10)
+kClearTint = np.array([0.90, 1.00, 1.03])
+kWhiteTint = np.array([2.6, 1.50, 1.20])
 
 
 class SceneWriter:
@@ -131,17 +131,18 @@ class SceneWriter:
     def _add_lights(self, stage: Usd.Stage, sun: np.ndarray) -> None:
         dome = UsdLux.DomeLight.Define(stage, "/World/Lights/Sky")
         dome.CreateTextureFileAttr(f"./{self._beside('_sky.exr').name}")
+        dome.CreateIntensityAttr(1.25)
         dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
         distant = UsdLux.DistantLight.Define(stage, "/World/Lights/Sun")
         distant.CreateAngleAttr(1.0)
-        distant.CreateIntensityAttr(4.2)
+        distant.CreateIntensityAttr(5.5)
         distant.CreateNormalizeAttr(True)
         distant.CreateColorAttr(Gf.Vec3f(1.0, 0.84, 0.66))
         distant.AddTransformOp().Set(_frame(sun, np.zeros(3)))
         rim = UsdLux.RectLight.Define(stage, "/World/Lights/Rim")
         rim.CreateWidthAttr(0.8)
         rim.CreateHeightAttr(0.8)
-        rim.CreateIntensityAttr(14.0)
+        rim.CreateIntensityAttr(45.0)
         rim.CreateColorAttr(Gf.Vec3f(1.0, 0.62, 0.34))
         at, to = np.array([0.35, 1.05, -2.0]), np.array([0.1, 1.6, 0.0])
         rim.AddTransformOp().Set(_frame(at - to, at))
@@ -164,7 +165,7 @@ def _lookups() -> tuple[np.ndarray, np.ndarray]:
     layer = np.linspace(1.0, 0.0, 64)[:, None, None]
     clear = kClearTint * (0.88 + 0.24 * layer)
     tint = clear * (1.0 - frost) + kWhiteTint * frost
-    roughness = (0.10 + 0.45 * frost) * np.ones((64, 64, 3))
+    roughness = (0.17 + 0.40 * frost) * np.ones((64, 64, 3))
     return tint, roughness
 
 

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
+import numpy as np
+
 from . import _frazil
 from .film import Film
 from .version import version
@@ -125,6 +127,7 @@ def _provenance(scene: Any, options: dict[str, Any], stats: dict[str, Any]) -> d
         "frazil:scene": getattr(scene, "file", None),
         "frazil:frame": "default" if frame is None else float(frame),
         "frazil:camera": scene.camera.path,
+        "worldToCamera": np.linalg.inv(scene.camera.matrix),
         "frazil:objects": [item.path for item in scene.objects],
         "frazil:dropped_samples": int(stats.get("dropped_samples", 0)),
     }

@@ -123,8 +123,8 @@ TEST_CASE("n-gons of 3 to 20 corners give watertight meshes with outward winding
 
 TEST_CASE("infinite creases keep a cube") {
     ControlMesh cage = cube();
-    for (const std::array<int, 2> edge : {std::array{0, 1}, {1, 3}, {3, 2}, {2, 0}, {4, 5}, {5, 7}, {7, 6}, {6, 4},
-                                          {0, 4}, {1, 5}, {2, 6}, {3, 7}}) {
+    for (const std::array<int, 2> edge :
+         {std::array{0, 1}, {1, 3}, {3, 2}, {2, 0}, {4, 5}, {5, 7}, {7, 6}, {6, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}}) {
         cage.crease_indices.insert(cage.crease_indices.end(), edge.begin(), edge.end());
         cage.crease_lengths.push_back(2);
         cage.crease_sharpnesses.push_back(10.0f);
@@ -200,10 +200,29 @@ TEST_CASE("triangulate: convex and concave polygons keep their area and orientat
     CHECK(area_of({{0, 0, 0}, {2, -2, 0}, {0, 2, 0}, {-2, -2, 0}}) == doctest::Approx(4.0));
     CHECK(area_of({{2, -2, 0}, {0, 2, 0}, {-2, -2, 0}, {0, 0, 0}}) == doctest::Approx(4.0));
     // A comb with teeth, and a corner in the middle of a straight edge.
-    CHECK(area_of({{0, 0, 0}, {5, 0, 0}, {5, 3, 0}, {4, 3, 0}, {4, 1, 0}, {3, 1, 0}, {3, 3, 0}, {2, 3, 0}, {2, 1, 0},
-                   {1, 1, 0}, {1, 3, 0}, {0, 3, 0}, {0, 1, 0}}) == doctest::Approx(11.0));
+    CHECK(area_of({{0, 0, 0},
+                   {5, 0, 0},
+                   {5, 3, 0},
+                   {4, 3, 0},
+                   {4, 1, 0},
+                   {3, 1, 0},
+                   {3, 3, 0},
+                   {2, 3, 0},
+                   {2, 1, 0},
+                   {1, 1, 0},
+                   {1, 3, 0},
+                   {0, 3, 0},
+                   {0, 1, 0}}) == doctest::Approx(11.0));
     // A square with a square hole, joined by a bridge.
-    CHECK(area_of({{0, 0, 0}, {3, 0, 0}, {3, 3, 0}, {0, 3, 0}, {0, 0, 0}, {1, 1, 0}, {1, 2, 0}, {2, 2, 0}, {2, 1, 0},
+    CHECK(area_of({{0, 0, 0},
+                   {3, 0, 0},
+                   {3, 3, 0},
+                   {0, 3, 0},
+                   {0, 0, 0},
+                   {1, 1, 0},
+                   {1, 2, 0},
+                   {2, 2, 0},
+                   {2, 1, 0},
                    {1, 1, 0}}) == doctest::Approx(8.0));
 }
 

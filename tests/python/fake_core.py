@@ -16,6 +16,9 @@ AOVS = [
 ]
 
 
+CAMERA_TO_WORLD = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 2, 3, 1]], float)  # row vectors
+
+
 def aov_table():
     fixed = {"meaning": "made up", "filter": "average"}
     return [fixed | dict(zip(("name", "channels", "is_additive", "is_half"), row, strict=True)) for row in AOVS]
@@ -56,7 +59,7 @@ def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"
     return SimpleNamespace(
         file=str(file),
         frame=frame,
-        camera=SimpleNamespace(path=camera),
+        camera=SimpleNamespace(path=camera, matrix=CAMERA_TO_WORLD),
         objects=[SimpleNamespace(path="/World/Ice"), SimpleNamespace(path="/World/Rock")],
         render_settings=SimpleNamespace(resolution=resolution),
     )
@@ -69,7 +72,6 @@ def load_usd(path, frame=None, camera=None):
 def install(monkeypatch, core):
     """Put the fakes where the package looks for the real ones."""
     import frazil._frazil
-
     import frazil.usd
 
     monkeypatch.setattr(frazil._frazil, "render", core.render, raising=False)

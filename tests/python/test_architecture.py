@@ -1,6 +1,7 @@
 """The house keeps its order: who includes whom, what the page says of it, and which package is under test."""
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -85,6 +86,15 @@ def test_header_comments_say_what_a_file_is():
     for path in core_files():
         if path.suffix == ".h":
             assert path.read_text().startswith("// "), f"{path} begins without a header comment"
+
+
+def test_the_committed_stub_is_the_generated_one(tmp_path):
+    """A change of the module's face must be seen in the diff: `make stubs` writes it."""
+    pytest.importorskip("nanobind", reason="the stub generator belongs to the build tools")
+    command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "frazil._frazil", "-o", str(tmp_path / "a.pyi")]
+    subprocess.run(command, check=True, timeout=300)
+    committed = (ROOT / "python" / "frazil" / "_frazil.pyi").read_text()
+    assert (tmp_path / "a.pyi").read_text() == committed, "the stub is old. Run make stubs."
 
 
 def test_the_installed_package_is_that_of_this_tree():

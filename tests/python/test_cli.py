@@ -10,6 +10,7 @@ import time
 from types import SimpleNamespace
 
 import fake_core
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -60,6 +61,8 @@ def test_render_writes_exr_and_png_and_says_where(capsys, core, scene, tmp_path)
     assert (film.width, film.height) == (24, 12)
     assert set(film) == {row["name"] for row in fake_core.aov_table()}
     assert film.metadata["frazil:camera"] == "/World/Camera"
+    world_to_camera = np.reshape(film.metadata["worldToCamera"], (4, 4))
+    np.testing.assert_allclose(world_to_camera @ fake_core.CAMERA_TO_WORLD, np.eye(4), atol=1e-6)
     assert film.metadata["frazil:frame"] == "default"
     assert film.metadata["frazil:scene"] == str(scene)
     assert json.loads(film.metadata["frazil:objects"]) == ["/World/Ice", "/World/Rock"]
@@ -377,6 +380,14 @@ def test_info_of_a_stage(capsys, tmp_path):
         assert text in result.output
     assert "/World/Sky (DomeLight)" in result.output
     assert "/World/Blue (UsdPreviewSurface)" in result.output
+
+
+def test_info_of_a_stage_with_a_broken_reference_warns_in_one_line(capfd, tmp_path):
+    (tmp_path / "a.usda").write_text('#usda 1.0\ndef Xform "A" (references = @missing.usda@)\n{\n}\n')
+    status = main(["info", str(tmp_path / "a.usda")])
+    errors = capfd.readouterr().err
+    assert status == 0
+    assert re.fullmatch(r"frazil: warning: .*a\.usda: .*missing\.usda.*\n", errors)
 
 
 def test_info_of_points(capsys, tmp_path):

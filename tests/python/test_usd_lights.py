@@ -1,12 +1,11 @@
 """Lights: shapes, radiance, multipliers, groups, dome images and their orientation."""
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from pxr import Gf, Sdf, UsdGeom, UsdLux
 from test_usd_materials import write_image
 from usd_stages import add_quad, load, new_stage
-
-import OpenImageIO as oiio  # isort: skip
 
 
 @pytest.fixture

@@ -1,12 +1,15 @@
 """`frazil info`: what is in a USD stage, an EXR, or a file of points."""
 
 import os
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from ..warning import FrazilWarning
 
 __all__ = ["info_command"]
 
@@ -33,13 +36,16 @@ def info_command(
 
 
 def _describe_usd(file: Path) -> Iterator[str]:
-    from pxr import Tf, Usd, UsdGeom, UsdLux, UsdShade
+    from pxr import Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()  # else USD prints its own lines
     try:
         stage = Usd.Stage.Open(os.fspath(file))
     except Tf.ErrorException as error:
         reasons = [reason.commentary.strip() for reason in error.args if hasattr(reason, "commentary")]
         raise OSError(f"{file}: must be a USD stage: {'; '.join(reasons)}.") from None
+    for diagnostic in diagnostics.TakeUncoalescedDiagnostics():
+        warnings.warn(f"{file}: {diagnostic.commentary}", FrazilWarning, stacklevel=2)
     prims = list(stage.Traverse(Usd.TraverseInstanceProxies()))
     yield f"{file}: USD stage, {len(prims)} prims"
     yield f"  units      {UsdGeom.GetStageMetersPerUnit(stage):g} m, {UsdGeom.GetStageUpAxis(stage)} up"

@@ -84,6 +84,7 @@ def _read_camera(context: ReadContext, prim: Usd.Prim, matrix: np.ndarray) -> Ca
 
     near, far = (float(v) * float(scale[2]) for v in context.get(schema.GetClippingRangeAttr(), (1.0, 1e6)))
     is_orthographic = context.get(schema.GetProjectionAttr()) == UsdGeom.Tokens.orthographic
+    near = max(near, 0.0) if is_orthographic else near
     if not (math.isfinite(near) and far > near and (near > 0 or is_orthographic)):
         context.warn(
             prim.GetPath(), f"clippingRange must be 0 < near < far, got ({near}, {far}) m. Nothing is clipped."
@@ -105,43 +106,50 @@ def _read_camera(context: ReadContext, prim: Usd.Prim, matrix: np.ndarray) -> Ca
     )
 
 
-def scene_bounds(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner of a box around all objects, metres; zeros where there are none."""
-    boxes = {}
-    corners = []
+_BOX_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
+
+
+def box_corners(scene: Scene) -> np.ndarray:
+    """The corners (8N, 3) of every object's box in the world, metres."""
+    boxes: dict[int, np.ndarray] = {}
+    corners = [np.zeros((0, 3))]
     for item in scene.objects:
         if item.mesh not in boxes:
             positions = scene.mesh(item.mesh).positions
             low, high = positions.min(axis=0), positions.max(axis=0)
-            pick = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
-            boxes[item.mesh] = np.where(pick, high, low).astype(np.float64)
-        corners.append(boxes[item.mesh] @ item.matrix[:3, :3] + item.matrix[3, :3])
-    if not corners:
-        return np.zeros(3), np.zeros(3)
-    everything = np.concatenate(corners)
-    return everything.min(axis=0), everything.max(axis=0)
+            boxes[item.mesh] = np.where(_BOX_CORNERS, high, low).astype(np.float64)
+        matrix = item.matrix
+        corners.append(boxes[item.mesh] @ matrix[:3, :3] + matrix[3, :3])
+    return np.concatenate(corners)
 
 
 def frame_scene(scene: Scene) -> Camera:
     """A camera in front of the scene, a little above and to the right, that sees all of it."""
-    low, high = scene_bounds(scene)
-    center, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-3)
+    corners = box_corners(scene)
+    if len(corners) == 0:
+        corners = np.zeros((1, 3))
     backwards = np.array([0.45, 0.35, 1.0])
     backwards /= np.linalg.norm(backwards)
     right = np.cross([0.0, 1.0, 0.0], backwards)
     right /= np.linalg.norm(right)
-    aperture, focal_length = 20.955, 50.0
-    # The narrower side of a 16:9 picture must hold the sphere around the scene.
-    half_angle = math.atan(aperture * 9 / 16 / 2 / focal_length)
-    distance = radius / math.sin(half_angle)
+    axes = np.stack([right, np.cross(backwards, right), backwards])
+
+    # The least distance from which a 16:9 picture holds every corner, and a tenth more.
+    focal_length, width = 50.0, 20.955
+    height = width * 9 / 16
+    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    local = (corners - center) @ axes.T
+    reach = np.abs(local[:, :2]) * (2 * focal_length / np.array([width, height])) * 1.1
+    distance = max(float((local[:, 2:] + reach).max()), 1e-3)
+    radius = float(np.linalg.norm(local, axis=1).max())
     matrix = np.eye(4)
-    matrix[0, :3], matrix[1, :3], matrix[2, :3] = right, np.cross(backwards, right), backwards
+    matrix[:3, :3] = axes
     matrix[3, :3] = center + distance * backwards
     return Camera(
         matrix=matrix,
         focal_length=focal_length,
-        horizontal_aperture=aperture,
-        vertical_aperture=aperture * 9 / 16,
-        clipping=((distance - radius) * 0.5, (distance + radius) * 2),
+        horizontal_aperture=width,
+        vertical_aperture=height,
+        clipping=(1e-3 * distance, 2 * (distance + radius)),
         path="/framing_camera",
     )

@@ -65,10 +65,16 @@ def to_array(matrix: Gf.Matrix4d) -> np.ndarray:
     return np.array(matrix, dtype=np.float64)
 
 
+def are_singular(matrices: np.ndarray) -> np.ndarray:
+    """Which transforms (N, 4, 4) cannot be used: not finite, or flat, also in the core's single precision."""
+    with np.errstate(all="ignore"):
+        is_finite = np.isfinite(matrices.astype(np.float32)).all(axis=(1, 2))
+        linear = np.where(is_finite[:, None, None], matrices[:, :3, :3], 0.0)
+        volume = np.abs(np.linalg.det(linear))
+        box = np.prod(np.linalg.norm(linear, axis=2), axis=1)
+        return ~is_finite | ~((volume > 1e-9 * box) & (volume > 1e-36) & (volume < 1e36))
+
+
 def is_singular(matrix: np.ndarray) -> bool:
-    """Whether a transform is not finite or flattens space, so that it cannot be inverted."""
-    if not np.isfinite(matrix).all():
-        return True
-    linear = matrix[:3, :3]
-    scale = np.linalg.norm(linear, axis=1)
-    return bool((scale == 0).any() or abs(np.linalg.det(linear / scale[:, None])) < 1e-9)
+    """Whether one transform (4, 4) cannot be used; see are_singular."""
+    return bool(are_singular(matrix[None])[0])

@@ -55,15 +55,15 @@ def read_mesh(context: ReadContext, prim: Usd.Prim, texcoord_name: str | None) -
         counts,
         indices,
         hole_indices=_array(context, schema.GetHoleIndicesAttr(), np.int32),
-        normals=None if level else normals,
+        normals=normals if level is None else None,
         uvs=uvs,
         colors=colors,
-        **(_creases(context, schema) if level else {}),
+        **({} if level is None else _creases(context, schema)),
     )
-    if level:
-        mesh, faces = subdivide(cage, 2**level, str(path))
-    else:
+    if level is None:
         mesh, faces = triangulate(cage, str(path))
+    else:
+        mesh, faces = subdivide(cage, 2**level, str(path))
     if len(faces) == 0:
         context.warn(path, "has no faces that can be seen. It is left out.")
         return []
@@ -94,21 +94,21 @@ def _reorder_corners(primvar: Primvar | None, order: np.ndarray) -> Primvar | No
     return np.ascontiguousarray(primvar[0][order]), primvar[1]
 
 
-def _subdivision_steps(context: ReadContext, schema: UsdGeom.Mesh, counts: np.ndarray, has_normals: bool) -> int:
-    """How often each face is halved; 0 = flat polygons."""
+def _subdivision_steps(context: ReadContext, schema: UsdGeom.Mesh, counts: np.ndarray, has_normals: bool) -> int | None:
+    """How often each edge is halved (0 = the cage itself, on the limit surface); None = flat polygons."""
     attribute = schema.GetSubdivisionSchemeAttr()
     scheme = attribute.Get()
     if scheme == UsdGeom.Tokens.loop:
         context.warn(schema.GetPath(), "subdivisionScheme loop is not supported. Its polygons are rendered flat.")
-        return 0
+        return None
     if scheme != UsdGeom.Tokens.catmullClark:
-        return 0
+        return None
     # Catmull-Clark is USD's default, so that many exporters of plain polygons get it by saying nothing. Normals of
     # their own give those away: a subdivision surface has none.
     if has_normals and not attribute.HasAuthoredValue():
-        return 0
+        return None
     steps = context.subdivision_level
-    while steps > 0 and 2 * len(counts) * 4**steps > _MAX_REFINED_TRIANGLES:
+    while steps > 0 and counts.sum() // 2 * 4**steps > _MAX_REFINED_TRIANGLES:
         steps -= 1
     return steps
 

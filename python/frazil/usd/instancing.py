@@ -8,7 +8,7 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdShade
 
 from .._frazil import Scene
-from .context import ReadContext, is_singular, to_array
+from .context import ReadContext, are_singular, to_array
 from .geometry import MeshPart, material_subsets, read_mesh
 from .gprims import read_gprim
 from .lights import add_light, is_light
@@ -114,8 +114,8 @@ class StageWalker:
         parts = self._mesh_parts(prim, texcoord_name)
         if not parts:
             return
-        for matrix, path in zip(matrices, paths, strict=True):
-            if is_singular(matrix):
+        for matrix, path, is_flat in zip(matrices, paths, are_singular(matrices), strict=True):
+            if is_flat:
                 self._context.warn(path, "its transform cannot be inverted (a scale of 0?). It is left out.")
                 continue
             for mesh, subset in parts:

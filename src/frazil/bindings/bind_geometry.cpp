@@ -42,8 +42,8 @@ const char* interpolation_name(Interpolation interpolation) {
 template <class T, class Mesh>
 nb::object view_primvar(Primvar<T>& primvar, Mesh& owner) {
     if (primvar.is_empty()) return nb::none();
-    return nb::cast(view(&primvar.values.data()->x, {primvar.values.size(), sizeof(T) / sizeof(float)},
-                         nb::find(owner)));
+    return nb::cast(
+        view(&primvar.values.data()->x, {primvar.values.size(), sizeof(T) / sizeof(float)}, nb::find(owner)));
 }
 
 std::vector<std::int32_t> to_integers(const IntArray& array) {
@@ -185,14 +185,14 @@ void bind_geometry(nb::module_& module) {
             },
             "values"_a, "interpolation"_a = nb::none(), "Give display colours, linear RGB; see set_normals.")
         .def_prop_ro(
-            "normals", [](Mesh& mesh) { return view_primvar(mesh.normals, mesh); }, nb::sig("def normals(self) -> numpy.ndarray | None"),
-            "View of the normals, or None.")
+            "normals", [](Mesh& mesh) { return view_primvar(mesh.normals, mesh); },
+            nb::sig("def normals(self) -> numpy.ndarray | None"), "View of the normals, or None.")
         .def_prop_ro(
-            "uvs", [](Mesh& mesh) { return view_primvar(mesh.uvs, mesh); }, nb::sig("def uvs(self) -> numpy.ndarray | None"),
-            "View of the texture coordinates, or None.")
+            "uvs", [](Mesh& mesh) { return view_primvar(mesh.uvs, mesh); },
+            nb::sig("def uvs(self) -> numpy.ndarray | None"), "View of the texture coordinates, or None.")
         .def_prop_ro(
-            "colors", [](Mesh& mesh) { return view_primvar(mesh.colors, mesh); }, nb::sig("def colors(self) -> numpy.ndarray | None"),
-            "View of the display colours, or None.")
+            "colors", [](Mesh& mesh) { return view_primvar(mesh.colors, mesh); },
+            nb::sig("def colors(self) -> numpy.ndarray | None"), "View of the display colours, or None.")
         .def_prop_ro("normals_interpolation",
                      [](const Mesh& mesh) { return interpolation_name(mesh.normals.interpolation); })
         .def_prop_ro("uvs_interpolation", [](const Mesh& mesh) { return interpolation_name(mesh.uvs.interpolation); })
@@ -204,7 +204,8 @@ void bind_geometry(nb::module_& module) {
                 const std::vector<std::int32_t> kept = to_integers(triangles);
                 for (const std::int32_t t : kept) {
                     if (t < 0 || std::size_t(t) >= mesh.triangles.size()) {
-                        throw ValueError(str("Mesh: triangles must be in 0..", int(mesh.triangles.size()) - 1, ", got ", t, "."));
+                        throw ValueError(
+                            str("Mesh: triangles must be in 0..", int(mesh.triangles.size()) - 1, ", got ", t, "."));
                     }
                 }
                 return submesh(mesh, kept);
@@ -213,8 +214,7 @@ void bind_geometry(nb::module_& module) {
         .def(
             "transformed",
             [](const Mesh& mesh, const MatrixArray& matrix) { return transformed(mesh, to_matrix(matrix)); },
-            "matrix"_a,
-            "Moved by a (4, 4) float64 matrix for row vectors; a mirroring one also flips the winding.")
+            "matrix"_a, "Moved by a (4, 4) float64 matrix for row vectors; a mirroring one also flips the winding.")
         .def_prop_ro("area", &surface_area, "Surface area in square metres.")
         .def("__repr__", [](const Mesh& mesh) {
             return str("Mesh(", mesh.positions.size(), " vertices, ", mesh.triangles.size(), " triangles)");

@@ -100,10 +100,10 @@ void bind_texture(nb::module_& module) {
             "texels"_a, "wrap_s"_a = "repeat", "wrap_t"_a = "repeat")
         .def_prop_ro("texels",
                      [](Texture& texture) {
-                         return view(texture.texels.data(),
-                                     {std::size_t(texture.height), std::size_t(texture.width),
-                                      std::size_t(texture.channels)},
-                                     nb::find(texture));
+                         return view(
+                             texture.texels.data(),
+                             {std::size_t(texture.height), std::size_t(texture.width), std::size_t(texture.channels)},
+                             nb::find(texture));
                      })
         .def_prop_ro("wrap_s", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_s); })
         .def_prop_ro("wrap_t", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_t); })
@@ -140,10 +140,13 @@ void bind_texture(nb::module_& module) {
         .def_prop_ro("scale", [](const TextureLookup& lookup) { return from_v3f(lookup.scale); })
         .def_prop_ro("bias", [](const TextureLookup& lookup) { return from_v3f(lookup.bias); })
         .def_prop_ro("st_scale",
-                     [](const TextureLookup& lookup) { return Pair{lookup.st_scale.x, lookup.st_scale.y}; })
-        .def_prop_ro(
-            "st_translation",
-            [](const TextureLookup& lookup) { return Pair{lookup.st_translation.x, lookup.st_translation.y}; })
+                     [](const TextureLookup& lookup) {
+                         return Pair{lookup.st_scale.x, lookup.st_scale.y};
+                     })
+        .def_prop_ro("st_translation",
+                     [](const TextureLookup& lookup) {
+                         return Pair{lookup.st_translation.x, lookup.st_translation.y};
+                     })
         .def_ro("st_rotation", &TextureLookup::st_rotation)
         .def("__repr__", [](const TextureLookup& lookup) {
             return str("TextureLookup(", lookup.texture ? str(lookup.texture->width, "x", lookup.texture->height) : "",
@@ -163,19 +166,11 @@ void bind_standard(nb::module_& module) {
            const FloatInput& metallic, const FloatInput& roughness, const FloatInput& clearcoat,
            const FloatInput& clearcoat_roughness, const FloatInput& opacity, float opacity_threshold, float ior,
            const std::optional<TextureLookup>& normal) {
-            new (self) StandardMaterial{to_input(diffuse_color),
-                                        uses_display_color,
-                                        to_input(emissive_color),
-                                        use_specular_workflow,
-                                        to_input(specular_color),
-                                        to_input(metallic),
-                                        to_input(roughness),
-                                        to_input(clearcoat),
-                                        to_input(clearcoat_roughness),
-                                        to_input(opacity),
-                                        opacity_threshold,
-                                        ior,
-                                        normal.value_or(TextureLookup{})};
+            new (self) StandardMaterial{
+                to_input(diffuse_color),         uses_display_color, to_input(emissive_color), use_specular_workflow,
+                to_input(specular_color),        to_input(metallic), to_input(roughness),      to_input(clearcoat),
+                to_input(clearcoat_roughness),   to_input(opacity),  opacity_threshold,        ior,
+                normal.value_or(TextureLookup{})};
         },
         nb::kw_only(), "diffuse_color"_a = ColorInput(from_v3f(preset.diffuse_color.value)),
         "uses_display_color"_a = false, "emissive_color"_a = ColorInput(Triple{0, 0, 0}),
@@ -261,7 +256,8 @@ void bind_ice(nb::module_& module) {
                      })
         .def_prop_ro("ramp_preserve_energy", [](const IceMaterial& model) { return model.ramp.preserve_energy; })
         .def_prop_rw(
-            "compensation", [](const IceMaterial& model) { return to_name(kCompensationNames, model.compensation.mode); },
+            "compensation",
+            [](const IceMaterial& model) { return to_name(kCompensationNames, model.compensation.mode); },
             [](IceMaterial& model, const std::string& name) {
                 model.compensation.mode = from_name(kCompensationNames, name, "IceMaterial: compensation");
             })

@@ -2,6 +2,7 @@
 #include "frazil/bindings/bindings.h"
 #include "frazil/points/point_file.h"
 #include "frazil/points/poisson.h"
+#include "frazil/points/statistics.h"
 #include "frazil/points/tessellated.h"
 
 namespace frazil {
@@ -37,10 +38,16 @@ void bind_points(nb::module_& module) {
     nb::class_<PointSet>(module, "PointSet",
                          "Points on a mesh that stand for its surface. The arrays are views of the set's own memory.")
         .def_prop_ro(
-            "positions", [](PointSet& p) { return view(&raw(p.positions)->x, {p.size(), 3}, nb::find(p)); },
+            "positions",
+            [](PointSet& p) {
+                return view(&raw(p.positions)->x, {p.size(), 3}, nb::find(p));
+            },
             "(N, 3) float32, metres.")
         .def_prop_ro(
-            "normals", [](PointSet& p) { return view(&raw(p.normals)->x, {p.size(), 3}, nb::find(p)); },
+            "normals",
+            [](PointSet& p) {
+                return view(&raw(p.normals)->x, {p.size(), 3}, nb::find(p));
+            },
             "(N, 3) float32: the triangles' geometric normals, unit length.")
         .def_prop_ro(
             "areas", [](PointSet& p) { return view(raw(p.areas), {p.size()}, nb::find(p)); },
@@ -49,8 +56,14 @@ void bind_points(nb::module_& module) {
             "triangles", [](PointSet& p) { return view(raw(p.triangles), {p.size()}, nb::find(p)); },
             "(N,) int32: the triangle that each point lies on.")
         .def_prop_ro(
-            "barycentrics", [](PointSet& p) { return view(&raw(p.barycentrics)->x, {p.size(), 2}, nb::find(p)); },
+            "barycentrics",
+            [](PointSet& p) {
+                return view(&raw(p.barycentrics)->x, {p.size(), 2}, nb::find(p));
+            },
             "(N, 2) float32 in [0, 1]: the weights of the triangle's second and third corner.")
+        .def_prop_ro(
+            "triangle_areas", [](PointSet& p) { return view(raw(p.triangle_areas), {p.size()}, nb::find(p)); },
+            "(N,) float32, m²: the area of each point's triangle, which `on` needs.")
         .def_ro("spacing", &PointSet::spacing, "The distance asked for, metres; the largest where it varies.")
         .def(
             "save",
@@ -68,32 +81,73 @@ void bind_points(nb::module_& module) {
                 return load_points(name);
             },
             "path"_a, "Read a file that save() wrote. OSError where it cannot be read.")
+        .def(
+            "on",
+            [](const PointSet& points, const Mesh& mesh) {
+                const nb::gil_scoped_release release;
+                return points_on(points, mesh);
+            },
+            "mesh"_a,
+            "The same points, with the same ids, on another pose of the mesh that they were made on: positions, "
+            "normals\n"
+            "and areas follow their triangles. ValueError where the pose has fewer triangles.")
         .def("__len__", &PointSet::size)
-        .def("__repr__", [](const PointSet& p) { return str("PointSet(", p.size(), " points, spacing ", p.spacing, ")"); });
+        .def("__repr__",
+             [](const PointSet& p) { return str("PointSet(", p.size(), " points, spacing ", p.spacing, ")"); });
 
+    const auto place = [&](const char* name, auto make) {
+        module.def(name, make, "mesh"_a, "spacing"_a, "seed"_a = 0, "thin_walls"_a = true, "max_points"_a = 0,
+                   "threads"_a = 0, "progress"_a = nb::none());
+    };
+    using MaybeCall = std::optional<nb::callable>;
+    place("poisson_points_constant", [](const Mesh& mesh, double spacing, std::uint32_t seed, bool thin_walls,
+                                        std::uint64_t max_points, int threads, const MaybeCall& progress) {
+        Progress told = make_progress(progress);
+        const nb::gil_scoped_release release;
+        return with_threads(threads, [&] {
+            return poisson_points(mesh, spacing, {seed, thin_walls, max_points}, &told);
+        });
+    });
+    place("poisson_points_varying", [](const Mesh& mesh, const FloatArray& spacing, std::uint32_t seed, bool thin_walls,
+                                       std::uint64_t max_points, int threads, const MaybeCall& progress) {
+        const std::vector<float> values(spacing.data(), spacing.data() + spacing.size());
+        Progress told = make_progress(progress);
+        const nb::gil_scoped_release release;
+        return with_threads(threads, [&] {
+            return poisson_points(mesh, values, {seed, thin_walls, max_points}, &told);
+        });
+    });
+    place("poisson_points_by_count", [](const Mesh& mesh, std::uint64_t count, std::uint32_t seed, bool thin_walls,
+                                        std::uint64_t max_points, int threads, const MaybeCall& progress) {
+        Progress told = make_progress(progress);
+        const nb::gil_scoped_release release;
+        return with_threads(threads, [&] {
+            return poisson_points_by_count(mesh, count, {seed, thin_walls, max_points}, &told);
+        });
+    });
+    nb::class_<PointStatistics>(module, "PointStatistics", "How good a point set is; distances in metres.")
+        .def_ro("count", &PointStatistics::count)
+        .def_ro("min_distance", &PointStatistics::min_distance, "Of any two points on the same side.")
+        .def_ro("mean_distance", &PointStatistics::mean_distance, "From a point to its nearest.")
+        .def_ro("distance_spread", &PointStatistics::distance_spread, "Its standard deviation over its mean.")
+        .def_ro("gap", &PointStatistics::gap, "The largest sampled distance from the surface to its nearest point.")
+        .def_ro("mean_area", &PointStatistics::mean_area)
+        .def_ro("area_spread", &PointStatistics::area_spread, "Standard deviation of the areas over their mean.")
+        .def_ro("area_sum", &PointStatistics::area_sum)
+        .def("__repr__", [](const PointStatistics& s) {
+            return str("PointStatistics(count=", s.count, ", min_distance=", s.min_distance, ", gap=", s.gap,
+                       ", distance_spread=", s.distance_spread, ", area_spread=", s.area_spread, ")");
+        });
     module.def(
-        "poisson_points",
-        [](const Mesh& mesh, double spacing, std::uint32_t seed, bool thin_walls, std::uint64_t max_points, int threads,
-           const std::optional<nb::callable>& progress) {
-            Progress told = make_progress(progress);
+        "point_statistics",
+        [](const PointSet& points, const Mesh& mesh, bool thin_walls, std::size_t samples) {
             const nb::gil_scoped_release release;
-            return with_threads(threads,
-                                [&] { return poisson_points(mesh, spacing, {seed, thin_walls, max_points}, &told); });
+            return point_statistics(points, mesh, thin_walls, samples);
         },
-        "mesh"_a, "spacing"_a, "seed"_a = 0, "thin_walls"_a = true, "max_points"_a = 0, "threads"_a = 0,
-        "progress"_a = nb::none(),
-        "Poisson-disk points on any mesh: never nearer than spacing, no surface farther than it from a point.\n\n"
-        "Parameters\n----------\n"
-        "mesh : Mesh, any triangle soup with some area.\n"
-        "spacing : float > 0, metres.\n"
-        "seed : int; the result depends on (mesh, spacing, seed) alone.\n"
-        "thin_walls : bool; True gives each side of a thin sheet its own points, False forbids any two points nearer\n"
-        "    than spacing.\n"
-        "max_points : int; refuse to make more. 0 allows what fits into free memory.\n"
-        "threads : int; 0 takes all cores.\n"
-        "progress : callable (stage, fraction), optional.\n\n"
-        "Returns\n-------\nPointSet, about 0.7 area / spacing² points.\n\n"
-        "Raises\n------\nValueError\n    For spacing that is not > 0 or would make too many points, or a mesh without area.");
+        "points"_a, "mesh"_a, "thin_walls"_a = true, "samples"_a = 0,
+        "Measure a point set: nearest pair, largest gap over `samples` places of the surface (0: ten a point, at "
+        "least\n"
+        "100,000), spread of nearest distances and of areas.");
     module.def(
         "tessellated_points",
         [](const Mesh& mesh, double edge_length) {

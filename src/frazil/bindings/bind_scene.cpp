@@ -40,11 +40,12 @@ std::uint32_t check_index(int index, std::size_t size, const std::string& path, 
 }
 
 void bind_lights(nb::module_& module) {
-    nb::class_<DomeLight>(module, "DomeLight",
-                          "Light from all around.\n\n"
-                          "Parameters\n----------\n"
-                          "image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a\n"
-                          "    uniform dome. Copied.")
+    nb::class_<DomeLight>(
+        module, "DomeLight",
+        "Light from all around.\n\n"
+        "Parameters\n----------\n"
+        "image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a\n"
+        "    uniform dome. Copied.")
         .def(
             "__init__",
             [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path) {
@@ -113,7 +114,10 @@ void bind_lights(nb::module_& module) {
         .def_rw("group", &Light::group)
         .def_rw("shape", &Light::shape)
         .def_prop_rw(
-            "radiance", [](const Light& light) { return Triple{light.radiance.x, light.radiance.y, light.radiance.z}; },
+            "radiance",
+            [](const Light& light) {
+                return Triple{light.radiance.x, light.radiance.y, light.radiance.z};
+            },
             [](Light& light, const Triple& value) { light.radiance = Rgb(value[0], value[1], value[2]); })
         .def_rw("normalize", &Light::normalize)
         .def_prop_rw(
@@ -172,7 +176,9 @@ void bind_camera(nb::module_& module) {
         .def_rw("aperture_scale", &Camera::aperture_scale)
         .def_prop_rw(
             "clipping",
-            [](const Camera& camera) { return std::array<float, 2>{camera.clipping.x, camera.clipping.y}; },
+            [](const Camera& camera) {
+                return std::array<float, 2>{camera.clipping.x, camera.clipping.y};
+            },
             [](Camera& camera, std::array<float, 2> range) { camera.clipping = V2f(range[0], range[1]); })
         .def("__repr__", [](const Camera& camera) {
             return str("Camera(", camera.path, ", ", camera.is_orthographic ? "orthographic" : "perspective", ")");

@@ -19,8 +19,16 @@ namespace frazil {
 namespace nb = nanobind;
 using namespace nb::literals;
 
-using FloatArray = nb::ndarray<const float, nb::c_contig, nb::device::cpu>;
-using IntArray = nb::ndarray<const std::int32_t, nb::c_contig, nb::device::cpu>;
+// An argument that may be anything numpy makes an array of without losing its kind: lists, other types and orders,
+// subclasses of ndarray. Copied only where it must be.
+template <class T>
+struct ArrayLike : nb::ndarray<const T, nb::c_contig, nb::device::cpu> {
+    using Base = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+    ArrayLike() = default;
+    explicit ArrayLike(Base array) : Base(std::move(array)) {}
+};
+using FloatArray = ArrayLike<float>;
+using IntArray = ArrayLike<std::int32_t>;
 
 // Copy an (N, 3)-like array of floats into vectors; ValueError names `what` where the shape is wrong.
 std::vector<V3f> to_vectors3(const FloatArray& array, const char* what);
@@ -47,3 +55,29 @@ void bind_scene(nb::module_& module);
 void bind_render(nb::module_& module);
 
 }  // namespace frazil
+
+namespace nanobind::detail {
+
+template <class T>
+struct type_caster<frazil::ArrayLike<T>> {
+    NB_TYPE_CASTER(frazil::ArrayLike<T>, const_name("numpy.typing.ArrayLike"))
+
+    bool from_python(handle source, std::uint8_t, cleanup_list*) noexcept {
+        if (source.is_none()) return false;
+        try {
+            const module_ numpy = module_::import_("numpy");
+            const char* type = std::is_same_v<T, float> ? "float32" : "int32";
+            const object array = numpy.attr("asarray")(source).attr("astype")(type, "C", "same_kind", false, false);
+            value = Value(nanobind::cast<typename Value::Base>(array));
+            return true;
+        } catch (python_error&) {  // not an array of that kind: nanobind reports the argument
+            return false;
+        } catch (cast_error&) {
+            return false;
+        }
+    }
+
+    static handle from_cpp(const Value&, rv_policy, cleanup_list*) noexcept = delete;
+};
+
+}  // namespace nanobind::detail

@@ -1,255 +1,71 @@
 // The curved half of subdivision.h: Catmull-Clark limit surfaces. Flat polygons are in triangulation.cpp.
-#include "frazil/geometry/subdivision.h"
-
-#include <bit>
-#include <cstring>
 #include <numeric>
-#include <unordered_map>
+#include <tuple>
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/random.h"
-#include "frazil/geometry/embree.h"
+#include "frazil/geometry/clean_cage.h"
+#include "frazil/geometry/limit_surface.h"
 
 namespace frazil {
 namespace {
 
-constexpr std::size_t kMaxFaceSize = 15;        // Embree's
-constexpr float kCreaseMargin = 0.02f;       // of a patch, for normals beside creases
-constexpr float kSameSurface = 0.97f;        // cosine between normals of one vertex that are still one surface
-constexpr float kInfiniteSharpness = 10.0f;  // USD's
+constexpr float kCreaseMargin = 0.02f;  // of a patch, for normals beside creases
+constexpr float kSameSurface = 0.97f;   // cosine between normals of one vertex that are still one surface
 
-// The cage without what Embree cannot take: faces of fewer than three corners, of more than 15, or that pass a vertex
-// twice. `faces` tells where each kept face (or piece of one) came from.
-struct CleanCage {
-    ControlMesh cage;
-    std::vector<std::int32_t> faces;
-    std::vector<std::size_t> corners;  // the original corner of each kept corner
-};
-
-bool has_repeated_vertex(const std::vector<std::int32_t>& vertices, std::vector<std::int32_t>& scratch) {
-    scratch = vertices;
-    std::sort(scratch.begin(), scratch.end());
-    return std::adjacent_find(scratch.begin(), scratch.end()) != scratch.end();
+V2f corner_coordinates(int corner, int count) {
+    if (count != 4) return LimitSurface::in_sub_quad(corner, 0.0f, 0.0f);
+    return LimitSurface::in_quad(corner == 1 || corner == 2 ? 1.0f : 0.0f, corner >= 2 ? 1.0f : 0.0f);
 }
 
-CleanCage clean(const ControlMesh& cage, const std::string& path) {
-    CleanCage result;
-    std::vector<std::size_t> first_piece(cage.face_vertex_counts.size());
-    ControlMesh& out = result.cage;
-    const auto add_face = [&](std::size_t face, const std::vector<std::size_t>& corners) {
-        out.face_vertex_counts.push_back(std::int32_t(corners.size()));
-        result.faces.push_back(std::int32_t(face));
-        for (const std::size_t corner : corners) {
-            out.face_vertex_indices.push_back(cage.face_vertex_indices[corner]);
-            result.corners.push_back(corner);
-        }
+// The cage with its vertices on the limit surface and limit normals: level 1.
+ControlMesh pushed_to_limit(const ControlMesh& cage) {
+    ControlMesh result = cage;
+    const LimitSurface surface(cage, false);
+    // The corners at every vertex, sorted by vertex.
+    struct Corner {
+        std::int32_t vertex, face, corner;
     };
-    std::size_t first = 0;
-    std::vector<std::size_t> corners;
-    std::vector<std::int32_t> vertices, scratch;
+    std::vector<Corner> corners;
+    corners.reserve(cage.face_vertex_indices.size());
     for (std::size_t face = 0; face < cage.face_vertex_counts.size(); ++face) {
-        const int count = cage.face_vertex_counts[face];
-        first_piece[face] = result.faces.size();
-        // Edges without length go: a corner whose vertex is the next one's, too.
-        corners.clear(), vertices.clear();
-        for (int i = 0; i < count; ++i) {
-            const std::int32_t vertex = cage.face_vertex_indices[first + i];
-            if (vertex == cage.face_vertex_indices[first + (i + 1) % count]) continue;
-            corners.push_back(first + i), vertices.push_back(vertex);
-        }
-        first += count;
-        if (corners.size() < 3) continue;
-        if (corners.size() <= kMaxFaceSize && !has_repeated_vertex(vertices, scratch)) {
-            add_face(face, corners);
-            continue;
-        }
-        ControlMesh polygon;
-        polygon.face_vertex_counts = {std::int32_t(corners.size())};
-        for (std::size_t i = 0; i < corners.size(); ++i) {
-            polygon.positions.push_back(cage.positions[vertices[i]]);
-            polygon.face_vertex_indices.push_back(std::int32_t(i));
-        }
-        for (const V3i& t : triangulate(polygon, path).mesh.triangles) {
-            if (has_repeated_vertex({vertices[t.x], vertices[t.y], vertices[t.z]}, scratch)) continue;
-            add_face(face, {corners[t.x], corners[t.y], corners[t.z]});
+        for (std::int32_t i = 0; i < cage.face_vertex_counts[face]; ++i) {
+            corners.push_back({cage.face_vertex_indices[corners.size()], std::int32_t(face), i});
         }
     }
-    out.positions = cage.positions;
-    out.crease_indices = cage.crease_indices;
-    out.crease_lengths = cage.crease_lengths;
-    out.crease_sharpnesses = cage.crease_sharpnesses;
-    out.corner_indices = cage.corner_indices;
-    out.corner_sharpnesses = cage.corner_sharpnesses;
-    out.is_boundary_smooth = cage.is_boundary_smooth;
-    for (const std::int32_t hole : cage.hole_faces) {
-        for (std::size_t i = first_piece[hole]; i < result.faces.size() && result.faces[i] == hole; ++i) {
-            out.hole_faces.push_back(std::int32_t(i));
+    std::stable_sort(corners.begin(), corners.end(),
+                     [](const Corner& a, const Corner& b) { return a.vertex < b.vertex; });
+    std::vector<std::size_t> first(cage.positions.size() + 1, 0);
+    for (const Corner& corner : corners) ++first[corner.vertex + 1];
+    std::inclusive_scan(first.begin(), first.end(), first.begin());
+
+    std::vector<V3f> normals(cage.positions.size(), V3f(0.0f));
+    parallel_for(cage.positions.size(), 512, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t vertex = begin; vertex < end; ++vertex) {
+            // All faces agree at a regular vertex; elsewhere the mean is what their approximations have in common.
+            const std::size_t valence = first[vertex + 1] - first[vertex];
+            const std::size_t stop = first[vertex] + (valence == 4 ? 1 : valence);
+            for (std::size_t i = first[vertex]; i < stop; ++i) {
+                const Corner& c = corners[i];
+                V3f normal;
+                surface.eval(std::uint32_t(c.face), corner_coordinates(c.corner, cage.face_vertex_counts[c.face]),
+                             result.positions[vertex], normal);
+                normals[vertex] += normal;
+            }
         }
+    });
+    throw_if_embree_failed("evaluating a subdivision surface");
+    const bool is_smooth = std::all_of(normals.begin(), normals.end(), [](const V3f& n) { return n.length() > 1e-3f; });
+    const bool has_creases = !cage.crease_lengths.empty() || !cage.corner_indices.empty();
+    // Creases, folds and loose vertices have no one normal: such a dense cage stays faceted.
+    if (is_smooth && !has_creases) {
+        for (V3f& normal : normals) normal.normalize();
+        result.normals = {std::move(normals), Interpolation::vertex};
+    } else {
+        result.normals = {};
     }
-    const auto pull = [&](const auto& primvar, auto& pulled) {
-        pulled.interpolation = primvar.interpolation;
-        if (primvar.is_empty()) return;
-        if (primvar.interpolation == Interpolation::corner) {
-            for (const std::size_t corner : result.corners) pulled.values.push_back(primvar.values[corner]);
-        } else if (primvar.interpolation == Interpolation::uniform) {
-            for (const std::int32_t face : result.faces) pulled.values.push_back(primvar.values[face]);
-        } else {
-            pulled.values = primvar.values;
-        }
-    };
-    pull(cage.uvs, out.uvs);
-    pull(cage.colors, out.colors);
     return result;
 }
-
-// Face-varying values as a topology of their own: equal values at one vertex are one, so that a seam is where they
-// differ.
-struct Seams {
-    std::vector<V2f> values;
-    std::vector<std::int32_t> indices;  // per corner
-};
-
-Seams find_seams(const ControlMesh& cage) {
-    struct Key {
-        std::int32_t vertex;
-        V2f value;
-        bool operator==(const Key&) const = default;
-    };
-    struct Hash {
-        std::size_t operator()(const Key& key) const {
-            return hash(std::uint32_t(key.vertex), std::bit_cast<std::uint32_t>(key.value.x + 0.0f),
-                        std::bit_cast<std::uint32_t>(key.value.y + 0.0f));
-        }
-    };
-    Seams seams;
-    std::unordered_map<Key, std::int32_t, Hash> known;
-    known.reserve(cage.positions.size());
-    for (std::size_t corner = 0; corner < cage.face_vertex_indices.size(); ++corner) {
-        const Key key{cage.face_vertex_indices[corner], cage.uvs.values[corner]};
-        const auto [at, is_new] = known.try_emplace(key, std::int32_t(seams.values.size()));
-        if (is_new) seams.values.push_back(key.value);
-        seams.indices.push_back(at->second);
-    }
-    return seams;
-}
-
-// The cage as an Embree geometry in a committed scene, ready for rtcInterpolate.
-class LimitSurface {
-  public:
-    explicit LimitSurface(const ControlMesh& cage) {
-        geometry_ = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_SUBDIVISION);
-        set_buffer(RTC_BUFFER_TYPE_FACE, 0, RTC_FORMAT_UINT, cage.face_vertex_counts);
-        set_buffer(RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, cage.face_vertex_indices);
-        set_float_buffer(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, cage.positions);
-        // Holes are not told to Embree, which would make boundaries of their edges; they are just never evaluated.
-        set_creases(cage);
-        rtcSetGeometrySubdivisionMode(
-            geometry_, 0,
-            cage.is_boundary_smooth ? RTC_SUBDIVISION_MODE_SMOOTH_BOUNDARY : RTC_SUBDIVISION_MODE_PIN_CORNERS);
-        set_uvs(cage);
-        rtcCommitGeometry(geometry_);
-        scene_ = rtcNewScene(embree_device());
-        rtcAttachGeometry(scene_, geometry_);
-        rtcCommitScene(scene_);
-        throw_if_embree_failed("building a subdivision surface");
-    }
-    ~LimitSurface() {
-        rtcReleaseScene(scene_);
-        rtcReleaseGeometry(geometry_);
-    }
-    LimitSurface(const LimitSurface&) = delete;
-    LimitSurface& operator=(const LimitSurface&) = delete;
-
-    // Limit position and unit normal; a zero normal where the tangents vanish.
-    void eval(std::uint32_t face, const V2f& at, V3f& position, V3f& normal) const {
-        float p[4], du[4], dv[4];
-        rtcInterpolate1(geometry_, face, at.x, at.y, RTC_BUFFER_TYPE_VERTEX, 0, p, du, dv, 3);
-        position = V3f(p[0], p[1], p[2]);
-        normal = V3f(du[0], du[1], du[2]).normalized().cross(V3f(dv[0], dv[1], dv[2]).normalized());
-        if (!is_finite(normal) || normal.length() < 1e-3f) {
-            normal = V3f(0.0f);
-        } else {
-            normal.normalize();
-        }
-    }
-
-    V2f eval_uv(std::uint32_t face, const V2f& at) const {
-        float st[4];
-        rtcInterpolate0(geometry_, face, at.x, at.y, RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, 0, st, 2);
-        return {st[0], st[1]};
-    }
-
-  private:
-    template <class T>
-    void set_buffer(RTCBufferType type, unsigned slot, RTCFormat format, const std::vector<T>& values) {
-        if (values.empty()) return;
-        void* memory = rtcSetNewGeometryBuffer(geometry_, type, slot, format, sizeof(T), values.size());
-        throw_if_embree_failed("allocating a subdivision surface");
-        std::memcpy(memory, values.data(), values.size() * sizeof(T));
-    }
-
-    // Embree loads four floats at once, also behind the last value: rows of four, zeros behind.
-    template <class T>
-    void set_float_buffer(RTCBufferType type, RTCFormat format, const std::vector<T>& values) {
-        constexpr std::size_t kStride = 4 * sizeof(float);
-        auto* memory =
-            static_cast<std::byte*>(rtcSetNewGeometryBuffer(geometry_, type, 0, format, kStride, values.size()));
-        throw_if_embree_failed("allocating a subdivision surface");
-        std::memset(memory, 0, values.size() * kStride);
-        for (std::size_t i = 0; i < values.size(); ++i) std::memcpy(memory + i * kStride, &values[i], sizeof(T));
-    }
-
-    static float sharpness(float value) {
-        return value >= kInfiniteSharpness ? std::numeric_limits<float>::infinity() : value;
-    }
-
-    void set_creases(const ControlMesh& cage) {
-        struct Edge {
-            std::int32_t a, b;
-        };
-        std::vector<Edge> edges;
-        std::vector<float> edge_weights;
-        // A chain of n vertices has n - 1 edges; sharpness is given per chain or per edge.
-        std::size_t edge_count = 0;
-        for (const std::int32_t length : cage.crease_lengths) edge_count += std::max(0, length - 1);
-        const bool is_per_edge = cage.crease_sharpnesses.size() == edge_count &&
-                                 cage.crease_sharpnesses.size() != cage.crease_lengths.size();
-        std::size_t at = 0;
-        for (std::size_t chain = 0; chain < cage.crease_lengths.size(); ++chain) {
-            for (int i = 0; i + 1 < cage.crease_lengths[chain]; ++i) {
-                const float weight = cage.crease_sharpnesses[is_per_edge ? edges.size() : chain];
-                edges.push_back({cage.crease_indices[at + i], cage.crease_indices[at + i + 1]});
-                edge_weights.push_back(sharpness(weight));
-            }
-            at += cage.crease_lengths[chain];
-        }
-        set_buffer(RTC_BUFFER_TYPE_EDGE_CREASE_INDEX, 0, RTC_FORMAT_UINT2, edges);
-        set_buffer(RTC_BUFFER_TYPE_EDGE_CREASE_WEIGHT, 0, RTC_FORMAT_FLOAT, edge_weights);
-        std::vector<float> corner_weights;
-        for (const float value : cage.corner_sharpnesses) corner_weights.push_back(sharpness(value));
-        set_buffer(RTC_BUFFER_TYPE_VERTEX_CREASE_INDEX, 0, RTC_FORMAT_UINT, cage.corner_indices);
-        set_buffer(RTC_BUFFER_TYPE_VERTEX_CREASE_WEIGHT, 0, RTC_FORMAT_FLOAT, corner_weights);
-    }
-
-    void set_uvs(const ControlMesh& cage) {
-        if (cage.uvs.is_empty()) return;
-        rtcSetGeometryVertexAttributeCount(geometry_, 1);
-        if (cage.uvs.interpolation == Interpolation::vertex) {
-            set_float_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, RTC_FORMAT_FLOAT2, cage.uvs.values);
-        } else if (cage.uvs.interpolation == Interpolation::corner) {
-            const Seams seams = find_seams(cage);
-            rtcSetGeometryTopologyCount(geometry_, 2);
-            set_buffer(RTC_BUFFER_TYPE_INDEX, 1, RTC_FORMAT_UINT, seams.indices);
-            set_float_buffer(RTC_BUFFER_TYPE_VERTEX_ATTRIBUTE, RTC_FORMAT_FLOAT2, seams.values);
-            rtcSetGeometrySubdivisionMode(geometry_, 1, RTC_SUBDIVISION_MODE_PIN_BOUNDARY);
-            rtcSetGeometryVertexAttributeTopology(geometry_, 0, 1);
-        }
-    }
-
-    RTCGeometry geometry_ = nullptr;
-    RTCScene scene_ = nullptr;
-};
 
 // Undirected edges numbered in the order of their vertices; one number per face corner, for the edge that leaves it.
 struct Edges {
@@ -301,12 +117,11 @@ struct Patch {
     int side() const { return steps + 1; }
     std::size_t sample(int i, int j) const { return first_sample + std::size_t(j) * side() + i; }
 
-    // Embree's face coordinates: sub-quads lie in cells of a 4 x 4 board, shrunk to half so that they do not touch.
+    // Embree's coordinates of a sample, at least `margin` inside the patch.
     V2f coordinates(int i, int j, float margin = 0.0f) const {
         const float u = std::clamp(float(i) / float(steps), margin, 1.0f - margin);
         const float v = std::clamp(float(j) / float(steps), margin, 1.0f - margin);
-        if (sub < 0) return {u, v};
-        return {2.0f * float(sub % 4) + 0.5f + u, 2.0f * float(sub / 4) + 0.5f + v};
+        return sub < 0 ? LimitSurface::in_quad(u, v) : LimitSurface::in_sub_quad(sub, u, v);
     }
 };
 
@@ -326,9 +141,8 @@ class Refinement {
         mesh.positions.resize(vertex_count_);
         // Walk backwards, so that the first patch of those that share a vertex has the last word.
         for (std::size_t p = patches_.size(); p-- > 0;) {
-            for_samples(patches_[p], [&](std::size_t sample, std::size_t vertex) {
-                mesh.positions[vertex] = positions_[sample];
-            });
+            for_samples(patches_[p],
+                        [&](std::size_t sample, std::size_t vertex) { mesh.positions[vertex] = positions_[sample]; });
         }
         std::vector<std::size_t> corner_samples;
         for (const Patch& patch : patches_) {
@@ -395,28 +209,37 @@ class Refinement {
             for (int i = 0; i <= s; ++i) {
                 std::int32_t& vertex = vertices_[patch.sample(i, j)];
                 if (patch.sub < 0) {
-                    if (j == 0) vertex = edge_vertex(patch.face, 0, i);
-                    else if (i == s) vertex = edge_vertex(patch.face, 1, j);
-                    else if (j == s) vertex = edge_vertex(patch.face, 2, s - i);
-                    else if (i == 0) vertex = edge_vertex(patch.face, 3, s - j);
-                    else vertex = first + (j - 1) * (s - 1) + i - 1;
+                    if (j == 0)
+                        vertex = edge_vertex(patch.face, 0, i);
+                    else if (i == s)
+                        vertex = edge_vertex(patch.face, 1, j);
+                    else if (j == s)
+                        vertex = edge_vertex(patch.face, 2, s - i);
+                    else if (i == 0)
+                        vertex = edge_vertex(patch.face, 3, s - j);
+                    else
+                        vertex = first + (j - 1) * (s - 1) + i - 1;
                     continue;
                 }
                 const int before = (patch.sub + count - 1) % count;
-                if (j == 0) vertex = edge_vertex(patch.face, patch.sub, i);
-                else if (i == 0) vertex = edge_vertex(patch.face, before, level_ - j);
-                else if (i == s) vertex = spoke(patch.sub, j);
-                else if (j == s) vertex = spoke(before, i);
-                else vertex = first + 1 + count * (s - 1) + (patch.sub * (s - 1) + j - 1) * (s - 1) + i - 1;
+                if (j == 0)
+                    vertex = edge_vertex(patch.face, patch.sub, i);
+                else if (i == 0)
+                    vertex = edge_vertex(patch.face, before, level_ - j);
+                else if (i == s)
+                    vertex = spoke(patch.sub, j);
+                else if (j == s)
+                    vertex = spoke(before, i);
+                else
+                    vertex = first + 1 + count * (s - 1) + (patch.sub * (s - 1) + j - 1) * (s - 1) + i - 1;
             }
         }
     }
 
     void sample() {
-        const LimitSurface surface(cage_);
-        const bool has_smooth_uvs =
-            !cage_.uvs.is_empty() &&
-            (cage_.uvs.interpolation == Interpolation::vertex || cage_.uvs.interpolation == Interpolation::corner);
+        const bool has_smooth_uvs = !cage_.uvs.is_empty() && (cage_.uvs.interpolation == Interpolation::vertex ||
+                                                              cage_.uvs.interpolation == Interpolation::corner);
+        const LimitSurface surface(cage_, has_smooth_uvs);
         if (has_smooth_uvs) uvs_.resize(positions_.size());
         parallel_for(patches_.size(), 64, [&](std::size_t begin, std::size_t end) {
             for (std::size_t p = begin; p < end; ++p) {
@@ -541,8 +364,8 @@ class Refinement {
             for (int j = 0; j <= s; ++j) {
                 for (int i = 0; i <= s; ++i) {
                     const float u = float(i) / float(s), v = float(j) / float(s);
-                    samples[patch.sample(i, j)] = (corners[0] * (1 - u) + corners[1] * u) * (1 - v) +
-                                                  (corners[3] * (1 - u) + corners[2] * u) * v;
+                    samples[patch.sample(i, j)] =
+                        (corners[0] * (1 - u) + corners[1] * u) * (1 - v) + (corners[3] * (1 - u) + corners[2] * u) * v;
                 }
             }
         }
@@ -569,49 +392,27 @@ Mesh without_loose_vertices(const Mesh& mesh) {
     return submesh(mesh, all);
 }
 
-void check_creases(const ControlMesh& cage, const std::string& path) {
-    std::size_t indices = 0, edges = 0;
-    for (const std::int32_t length : cage.crease_lengths) {
-        if (length < 2) throw ValueError(str(path, ": creaseLengths must be >= 2, got ", length, "."));
-        indices += length, edges += length - 1;
-    }
-    if (indices != cage.crease_indices.size()) {
-        throw ValueError(str(path, ": creaseIndices must have ", indices, " entries (the sum of creaseLengths), got ",
-                             cage.crease_indices.size(), "."));
-    }
-    const std::size_t sharpnesses = cage.crease_sharpnesses.size();
-    if (sharpnesses != cage.crease_lengths.size() && sharpnesses != edges) {
-        throw ValueError(str(path, ": creaseSharpnesses must have ", cage.crease_lengths.size(),
-                             " values (one per crease), got ", sharpnesses, "."));
-    }
-    for (const auto* values : {&cage.crease_sharpnesses, &cage.corner_sharpnesses}) {
-        for (const float value : *values) {
-            if (!(value >= 0.0f)) throw ValueError(str(path, ": sharpness must be >= 0, got ", value, "."));
-        }
-    }
-    if (cage.corner_indices.size() != cage.corner_sharpnesses.size()) {
-        throw ValueError(str(path, ": cornerSharpnesses must have ", cage.corner_indices.size(),
-                             " values (one per corner), got ", cage.corner_sharpnesses.size(), "."));
-    }
-}
-
 }  // namespace
 
 RefinedMesh subdivide(const ControlMesh& cage, int level, const std::string& path) {
     if (level < 1) throw ValueError(str(path, ": the subdivision level must be >= 1, got ", level, "."));
     check_control_mesh(cage, path);
     check_creases(cage, path);
-    const CleanCage cleaned = clean(cage, path);
+    const CleanCage cleaned = clean_cage(cage, path);
     if (cleaned.faces.empty()) return {};
 
-    // Other faces than quads are cut through the middle of their edges, so that the number of steps must be even.
-    const auto& counts = cleaned.cage.face_vertex_counts;
-    const bool is_all_quads = std::all_of(counts.begin(), counts.end(), [](std::int32_t n) { return n == 4; });
-    if (!is_all_quads && level % 2 == 1) ++level;
-
     RefinedMesh result;
-    Refinement refinement(cleaned.cage, level);
-    result.mesh = without_loose_vertices(refinement.run(result.faces));
+    if (level == 1) {
+        result = triangulate(pushed_to_limit(cleaned.cage), path);
+        result.mesh = without_loose_vertices(result.mesh);
+    } else {
+        // Other faces than quads are cut through the middle of their edges, so that the number of steps must be even.
+        const auto& counts = cleaned.cage.face_vertex_counts;
+        const bool is_all_quads = std::all_of(counts.begin(), counts.end(), [](std::int32_t n) { return n == 4; });
+        if (!is_all_quads && level % 2 == 1) ++level;
+        Refinement refinement(cleaned.cage, level);
+        result.mesh = without_loose_vertices(refinement.run(result.faces));
+    }
     for (std::int32_t& face : result.faces) face = cleaned.faces[face];
     return result;
 }

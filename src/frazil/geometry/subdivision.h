@@ -43,7 +43,8 @@ struct RefinedMesh {
 void check_control_mesh(const ControlMesh& cage, const std::string& path);
 
 // Refine the cage; `level` >= 1 is the number of quads along each edge of a quad face (made even where there are other
-// faces). Face-varying uvs follow the surface inside and are linear along seams and boundaries; colors are bilinear.
+// faces). Level 1 is the triangulated cage with its vertices on the limit surface. Face-varying uvs follow the surface
+// inside and are linear along seams and boundaries; colors are bilinear.
 RefinedMesh subdivide(const ControlMesh& cage, int level, const std::string& path);
 
 // The same cage as flat polygons: n-gons cut by ear clipping in their plane, holes left out.

@@ -72,9 +72,7 @@ class EarClipper {
         for (int i = 0; i < count; ++i) points_[i] = {double((*positions[i])[x]), double((*positions[i])[y])};
     }
 
-    double area(int a, int b, int c) const {
-        return (points_[b] - points_[a]).cross(points_[c] - points_[a]);
-    }
+    double area(int a, int b, int c) const { return (points_[b] - points_[a]).cross(points_[c] - points_[a]); }
 
     bool is_ear(int at) const {
         if (is_reflex_[at]) return false;
@@ -95,9 +93,7 @@ class EarClipper {
 
 // A quad along the diagonal that leaves both halves on the front side; the first one where both do.
 void split_quad(const V3f* const* p, std::int32_t* corners) {
-    const auto cross = [&](int a, int b, int c) {
-        return (V3d(*p[b]) - V3d(*p[a])).cross(V3d(*p[c]) - V3d(*p[a]));
-    };
+    const auto cross = [&](int a, int b, int c) { return (V3d(*p[b]) - V3d(*p[a])).cross(V3d(*p[c]) - V3d(*p[a])); };
     const V3d normal = (V3d(*p[2]) - V3d(*p[0])).cross(V3d(*p[3]) - V3d(*p[1]));
     const bool is_first_valid = cross(0, 1, 2).dot(normal) >= 0.0 && cross(0, 2, 3).dot(normal) >= 0.0;
     constexpr std::int32_t kFirst[] = {0, 1, 2, 0, 2, 3}, kSecond[] = {1, 2, 3, 1, 3, 0};
@@ -131,8 +127,8 @@ void check_control_mesh(const ControlMesh& cage, const std::string& path) {
                                  ". Clean the mesh where it was made."));
         }
         if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kLargestCoordinate) {
-            throw ValueError(str(path, ": points must be within +-", kLargestCoordinate, ", got (", p.x, ", ", p.y, ", ",
-                                 p.z, ") at point ", i, ". Clean the mesh where it was made."));
+            throw ValueError(str(path, ": points must be within +-", kLargestCoordinate, ", got (", p.x, ", ", p.y,
+                                 ", ", p.z, ") at point ", i, ". Clean the mesh where it was made."));
         }
     }
     std::int64_t corners = 0;
@@ -144,8 +140,8 @@ void check_control_mesh(const ControlMesh& cage, const std::string& path) {
         corners += cage.face_vertex_counts[i];
     }
     if (corners != std::int64_t(cage.face_vertex_indices.size())) {
-        throw ValueError(str(path, ": faceVertexIndices must have ", corners, " entries (the sum of faceVertexCounts), got ",
-                             cage.face_vertex_indices.size(), "."));
+        throw ValueError(str(path, ": faceVertexIndices must have ", corners,
+                             " entries (the sum of faceVertexCounts), got ", cage.face_vertex_indices.size(), "."));
     }
     const auto check_range = [&](const std::vector<std::int32_t>& indices, std::size_t size, const char* name,
                                  const char* of) {

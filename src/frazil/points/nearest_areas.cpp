@@ -11,20 +11,22 @@ namespace frazil {
 namespace {
 
 constexpr std::size_t kTileGrain = 8;
+constexpr double kLongestEdge = 3.0;  // of a fragment, in spacings: larger ones share more of the work per point
 
 // Sums that do not depend on the order of their terms.
 class FixedPointSums {
   public:
-    FixedPointSums(std::size_t count, double total) : quantum_(std::ldexp(total, -61)), sums_(count, 0) {}
+    FixedPointSums(std::size_t count, double total)
+        : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
 
     void add(std::size_t index, double value) {
         std::atomic_ref<std::int64_t>(sums_[index])
-            .fetch_add(static_cast<std::int64_t>(value / quantum_), std::memory_order_relaxed);
+            .fetch_add(static_cast<std::int64_t>(value * inverse_), std::memory_order_relaxed);
     }
     double at(std::size_t index) const { return static_cast<double>(sums_[index]) * quantum_; }
 
   private:
-    double quantum_;
+    double quantum_, inverse_;
     std::vector<std::int64_t> sums_;
 };
 
@@ -34,15 +36,16 @@ class TileSharer {
     TileSharer(const Mesh& mesh, const SpacingField& spacing, bool thin_walls)
         : mesh_(mesh), spacing_(spacing), thin_walls_(thin_walls) {}
 
-    void share(const TileFrame& frame, const TileGrid& grid, std::size_t tile, double largest_radius,
+    void share(const TileFrame& frame, const TileGrid& grid, std::size_t tile,
                const std::vector<std::vector<Dart>>& darts, const std::vector<std::size_t>& first,
                FixedPointSums& areas) {
         fragments_.clear();
         for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
             append_fragments(mesh_, spacing_, frame, grid.triangles[i], kLongestEdge, fragments_);
         }
-        const double reach = kReach * largest_radius;
-        near_.reset(frame.size, largest_radius, reach);
+        float reach = 0.0f;
+        for (const Fragment& f : fragments_) reach = std::max(reach, fragment_reach(f));
+        near_.reset(frame.size, kCellWidth * reach, reach, least_cosine(thin_walls_));
         for (const Fragment& f : fragments_) {
             const V3f centroid = centroid_of(f);
             near_.mark(centroid, centroid);
@@ -68,18 +71,16 @@ class TileSharer {
         if (area == 0.0) return;
 
         const V3f centroid = centroid_of(f);
-        float extent2 = 0.0f, radius = 0.0f;
-        for (int k = 0; k < 3; ++k) {
-            extent2 = std::max(extent2, (f.corners[k] - centroid).length2());
-            radius = std::max(radius, f.radii[k]);
-        }
-        const float reach = (radius + std::sqrt(extent2)) * 1.001f;
+        float extent2 = 0.0f;
+        for (const V3f& corner : f.corners) extent2 = std::max(extent2, (corner - centroid).length2());
+        const float reach = fragment_reach(f);
         candidates_.clear();
         points_.clear();
-        near_.any_near(centroid, [&](std::uint32_t p) {
-            if ((near_.locals[p] - centroid).length2() > reach * reach) return false;
-            if (!is_same_side(near_.normals[p], f.normal, thin_walls_)) return false;
+        double surely = 1e30;  // some point is nearer than this to all of the fragment
+        near_.any_near(centroid, f.normal, reach * reach, [&](std::uint32_t p) {
             push_candidate(f, p);
+            const double* d = candidates_.back().d;
+            surely = std::min(surely, std::max(d[0], std::max(d[1], d[2])));
             return false;
         });
         if (candidates_.empty()) {
@@ -92,28 +93,35 @@ class TileSharer {
             return;
         }
 
+        // Leave out who is farther from all of the fragment than another point is from any of it.
+        const double farthest = std::sqrt(surely) * 1.0001 + std::sqrt(double(extent2));
+        std::size_t left = 0;
+        for (std::size_t i = 0; i < candidates_.size(); ++i) {
+            if ((near_.locals[points_[i]] - centroid).length2() > farthest * farthest) continue;
+            candidates_[left] = candidates_[i];
+            points_[left++] = points_[i];
+        }
+        candidates_.resize(left);
+        points_.resize(left);
+
         const int count = static_cast<int>(candidates_.size());
         int nearest[3];
-        for (int k = 0; k < 3; ++k) {
-            nearest[k] = 0;
-            for (int i = 1; i < count; ++i) {
-                if (candidates_[i].d[k] < candidates_[nearest[k]].d[k]) nearest[k] = i;
-            }
-        }
+        find_nearest(candidates_.data(), count, nearest);
         // A region of nearest points is convex: where it has all corners it has the whole fragment.
         if (nearest[0] == nearest[1] && nearest[1] == nearest[2]) {
             areas.add(indices_[points_[nearest[0]]], area);
             return;
         }
-        drop_dominated(candidates_.data(), count, kept_);
+        drop_dominated(candidates_.data(), count, nearest, kept_);
         shares_.clear();
         double total = 0.0;
-        Piece piece;
-        for (const int self : kept_) {
-            clip_piece(candidates_.data(), kept_, self, piece);
-            shares_.push_back(piece_share(piece));
+        for (std::size_t i = 0; i + 1 < kept_.size(); ++i) {
+            shares_.push_back(share_of(candidates_.data(), kept_, kept_[i]));
             total += shares_.back();
         }
+        // The last one has the rest.
+        shares_.push_back(std::max(0.0, 1.0 - total));
+        total += shares_.back();
         for (std::size_t i = 0; i < kept_.size(); ++i) {
             if (shares_[i] > 0.0) areas.add(indices_[points_[kept_[i]]], area * shares_[i] / total);
         }
@@ -121,8 +129,8 @@ class TileSharer {
 
     void push_candidate(const Fragment& f, std::uint32_t p) {
         const V3f& place = near_.locals[p];
-        candidates_.push_back({{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(),
-                                (f.corners[2] - place).length2()}});
+        candidates_.push_back(
+            {{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(), (f.corners[2] - place).length2()}});
         points_.push_back(p);
     }
 
@@ -141,8 +149,7 @@ class TileSharer {
 }  // namespace
 
 std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, double unit,
-                                 double largest_radius, bool thin_walls, const std::vector<std::vector<Dart>>& darts,
-                                 Progress* progress) {
+                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts, Progress* progress) {
     std::vector<std::size_t> first(grid.count() + 1, 0);
     for (std::size_t i = 0; i < grid.count(); ++i) first[i + 1] = first[i] + darts[i].size();
     FixedPointSums sums(first.back(), surface_area(mesh));
@@ -152,8 +159,7 @@ std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, 
     parallel_for(grid.count(), kTileGrain, [&](std::size_t begin, std::size_t end) {
         TileSharer& sharer = sharers.local();
         for (std::size_t tile = begin; tile < end; ++tile) {
-            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, largest_radius, darts, first,
-                         sums);
+            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, darts, first, sums);
         }
         if (progress) progress->update("areas", double(done += end - begin) / double(grid.count()));
     });

@@ -15,10 +15,8 @@
 
 namespace frazil {
 
-// darts[tile] are the points of each tile; the result is in that order, tile after tile. `unit` is the reference spacing,
-// `largest_radius` the largest spacing in that unit.
+// darts[tile] are the points of each tile; the result is in that order, tile after tile. `unit` is the reference spacing.
 std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, double unit,
-                                 double largest_radius, bool thin_walls, const std::vector<std::vector<Dart>>& darts,
-                                 Progress* progress);
+                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts, Progress* progress);
 
 }  // namespace frazil

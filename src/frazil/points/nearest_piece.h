@@ -27,21 +27,29 @@ inline PiecePlace mix_places(const PiecePlace& a, const PiecePlace& b, double t)
     return {a.u + (b.u - a.u) * t, a.v + (b.v - a.v) * t};
 }
 
-// Keep the candidates that are nearest somewhere on the fragment as far as its corners tell; `kept` holds their indices.
-// A candidate goes where another one is as near or nearer at all three corners.
-template <class Distances>
-void drop_dominated(const Distances* candidates, int count, std::vector<int>& kept) {
+// Leave out most candidates that are nearest nowhere on the fragment; `kept` holds the indices of the others. One goes
+// where another, the nearest to some corner, is as near or nearer at all corners. nearest[k] is the nearest to corner k.
+inline void drop_dominated(const CornerDistances* candidates, int count, const int nearest[3], std::vector<int>& kept) {
     kept.clear();
     for (int i = 0; i < count; ++i) {
-        const auto& a = candidates[i].d;
+        const double* a = candidates[i].d;
         bool is_dominated = false;
-        for (int j = 0; j < count && !is_dominated; ++j) {
-            if (j == i) continue;
-            const auto& b = candidates[j].d;
-            if (b[0] > a[0] || b[1] > a[1] || b[2] > a[2]) continue;
-            is_dominated = j < i || b[0] < a[0] || b[1] < a[1] || b[2] < a[2];
+        for (int k = 0; k < 3 && !is_dominated; ++k) {
+            const double* b = candidates[nearest[k]].d;
+            is_dominated = nearest[k] != i && b[0] <= a[0] && b[1] <= a[1] && b[2] <= a[2] &&
+                           (nearest[k] < i || b[0] < a[0] || b[1] < a[1] || b[2] < a[2]);
         }
         if (!is_dominated) kept.push_back(i);
+    }
+}
+
+// The nearest candidate to each corner.
+inline void find_nearest(const CornerDistances* candidates, int count, int nearest[3]) {
+    for (int k = 0; k < 3; ++k) {
+        nearest[k] = 0;
+        for (int i = 1; i < count; ++i) {
+            if (candidates[i].d[k] < candidates[nearest[k]].d[k]) nearest[k] = i;
+        }
     }
 }
 
@@ -70,5 +78,9 @@ inline double piece_share(const Piece& piece) {
     }
     return std::abs(twice);
 }
+
+// The share of the fragment that is nearest to candidate `self`, in [0, 1], to float precision: what areas need, several
+// times as fast. The same clip, on arrays, with a look at all corners at once before anything is cut.
+float share_of(const CornerDistances* candidates, const std::vector<int>& kept, int self);
 
 }  // namespace frazil

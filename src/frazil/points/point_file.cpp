@@ -21,12 +21,13 @@ struct Row {
     float area;
     std::int32_t triangle;
     V2f uv;
+    float triangle_area;
 };
 #pragma pack(pop)
-static_assert(sizeof(Row) == 40);
+static_assert(sizeof(Row) == 44);
 
-constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "area", "triangle", "u", "v"};
-constexpr int kFields = 10;
+constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "area", "triangle", "u", "v", "triangle_area"};
+constexpr int kFields = 11;
 
 std::size_t type_size(const std::string& type) {
     if (type == "char" || type == "uchar" || type == "int8" || type == "uint8") return 1;
@@ -109,13 +110,14 @@ void save_points(const PointSet& points, const std::string& path) {
         rows.resize(std::min(kRowsAtOnce, points.size() - begin));
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const std::size_t p = begin + i;
-            rows[i] = {points.positions[p], points.normals[p], points.areas[p], points.triangles[p],
-                       points.barycentrics[p]};
+            rows[i] = {points.positions[p], points.normals[p],      points.areas[p],
+                       points.triangles[p], points.barycentrics[p], points.triangle_areas[p]};
         }
         file.write(reinterpret_cast<const char*>(rows.data()), static_cast<std::streamsize>(rows.size() * sizeof(Row)));
     }
     file.close();
-    if (!file) throw FileError(path + ": file must be writable, got an error while writing. Check the folder and disk.");
+    if (!file)
+        throw FileError(path + ": file must be writable, got an error while writing. Check the folder and disk.");
 }
 
 PointSet load_points(const std::string& path) {
@@ -132,11 +134,7 @@ PointSet load_points(const std::string& path) {
     }
     PointSet points;
     points.spacing = layout.spacing;
-    points.positions.resize(layout.count);
-    points.normals.resize(layout.count);
-    points.areas.resize(layout.count);
-    points.triangles.resize(layout.count);
-    points.barycentrics.resize(layout.count);
+    resize(points, layout.count);
     std::vector<char> buffer;
     for (std::size_t first = 0; first < layout.count; first += kRowsAtOnce) {
         const std::size_t rows = std::min<std::size_t>(kRowsAtOnce, layout.count - first);
@@ -155,6 +153,7 @@ PointSet load_points(const std::string& path) {
             points.areas[first + i] = row.area;
             points.triangles[first + i] = row.triangle;
             points.barycentrics[first + i] = row.uv;
+            points.triangle_areas[first + i] = row.triangle_area;
         }
     }
     return points;

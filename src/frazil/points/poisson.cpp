@@ -7,6 +7,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
+#include "frazil/base/random.h"
 #include "frazil/points/nearest_areas.h"
 #include "frazil/points/point_budget.h"
 #include "frazil/points/tile_filler.h"
@@ -15,7 +16,8 @@
 namespace frazil {
 namespace {
 
-constexpr double kTileWidth = 8.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
+constexpr double kTileWidth =
+    12.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
 constexpr std::size_t kTriangleGrain = 4096;
 
 // The area, and the integral of 1 / spacing² over it, which tells the number of points.
@@ -37,23 +39,20 @@ Extent measure(const Mesh& mesh, const SpacingField& spacing) {
             const double a = spacing.at_vertex(t.x), b = spacing.at_vertex(t.y), c = spacing.at_vertex(t.z);
             // Exact for constant spacing, the mean of 1/r² over corners and centre otherwise.
             const double m = (a + b + c) / 3.0;
-            const double mean = spacing.per_vertex ? 0.75 / (m * m) + (1 / (a * a) + 1 / (b * b) + 1 / (c * c)) / 12.0
-                                                   : 1.0 / (a * a);
+            const double mean =
+                spacing.per_vertex ? 0.75 / (m * m) + (1 / (a * a) + 1 / (b * b) + 1 / (c * c)) / 12.0 : 1.0 / (a * a);
             sum += {area, area * mean};
         }
         return sum;
     });
 }
 
-PointSet assemble(std::vector<std::vector<Dart>>& darts, std::vector<float> areas) {
+PointSet assemble(const Mesh& mesh, std::vector<std::vector<Dart>>& darts, std::vector<float> areas) {
     std::vector<std::size_t> first(darts.size() + 1, 0);
     for (std::size_t i = 0; i < darts.size(); ++i) first[i + 1] = first[i] + darts[i].size();
     PointSet points;
+    resize(points, first.back());
     points.areas = std::move(areas);
-    points.positions.resize(first.back());
-    points.normals.resize(first.back());
-    points.triangles.resize(first.back());
-    points.barycentrics.resize(first.back());
     parallel_for(darts.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t tile = begin; tile < end; ++tile) {
             std::size_t at = first[tile];
@@ -61,6 +60,7 @@ PointSet assemble(std::vector<std::vector<Dart>>& darts, std::vector<float> area
                 points.positions[at] = dart.position;
                 points.normals[at] = dart.normal;
                 points.triangles[at] = dart.triangle;
+                points.triangle_areas[at] = static_cast<float>(0.5 * triangle_cross(mesh, dart.triangle).length());
                 points.barycentrics[at++] = dart.uv;
             }
             std::vector<Dart>().swap(darts[tile]);
@@ -69,8 +69,22 @@ PointSet assemble(std::vector<std::vector<Dart>>& darts, std::vector<float> area
     return points;
 }
 
-PointSet make_points(const Mesh& mesh, SpacingField spacing, double largest, const PoissonOptions& options,
-                     Progress* progress) {
+// Points in their tiles, before areas and arrays are made of them.
+struct Placed {
+    SpacingField spacing;
+    double unit;  // the reference spacing
+    TileGrid grid;
+    std::vector<std::vector<Dart>> darts;
+
+    std::size_t count() const {
+        std::size_t sum = 0;
+        for (const std::vector<Dart>& tile : darts) sum += tile.size();
+        return sum;
+    }
+};
+
+Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, const PoissonOptions& options,
+                    Progress* progress) {
     const Box3f box = bounds(mesh);
     // A spacing beyond the mesh's size asks for the same points as its size does, and keeps numbers tame.
     const double diagonal = mesh.positions.empty() ? 0.0 : (V3d(box.max) - V3d(box.min)).length();
@@ -111,7 +125,7 @@ PointSet make_points(const Mesh& mesh, SpacingField spacing, double largest, con
                 for (const std::uint32_t other : grid.neighbours(tile)) around.push_back(&darts[other]);
                 placed.clear();
                 filler.fill({grid.tile_origin(tile), unit, grid.size / unit}, &grid.triangles[grid.starts[tile]],
-                            grid.starts[tile + 1] - grid.starts[tile], around, grid.keys[tile], largest / unit, placed);
+                            grid.starts[tile + 1] - grid.starts[tile], around, grid.keys[tile], placed);
                 darts[tile] = std::vector<Dart>(placed);
             }
             if (progress) progress->update("points", double(done += end - begin) / double(grid.count()));
@@ -119,10 +133,14 @@ PointSet make_points(const Mesh& mesh, SpacingField spacing, double largest, con
     }
     fillers.clear();
 
+    return {spacing, unit, std::move(grid), std::move(darts)};
+}
+
+PointSet finish(const Mesh& mesh, Placed& placed, double spacing, bool thin_walls, Progress* progress) {
     std::vector<float> areas =
-        nearest_areas(mesh, spacing, grid, unit, largest / unit, options.thin_walls, darts, progress);
-    PointSet points = assemble(darts, std::move(areas));
-    points.spacing = asked;
+        nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls, placed.darts, progress);
+    PointSet points = assemble(mesh, placed.darts, std::move(areas));
+    points.spacing = spacing;
     return points;
 }
 
@@ -133,7 +151,8 @@ PointSet poisson_points(const Mesh& mesh, double spacing, const PoissonOptions& 
         throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", spacing, ". It is in metres."));
     }
     check_mesh(mesh, "Mesh");
-    return make_points(mesh, {spacing, nullptr}, spacing, options, progress);
+    Placed placed = place_points(mesh, {spacing, nullptr}, spacing, options, progress);
+    return finish(mesh, placed, spacing, options.thin_walls, progress);
 }
 
 PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spacing, const PoissonOptions& options,
@@ -146,13 +165,53 @@ PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spaci
     for (std::size_t i = 0; i < vertex_spacing.size(); ++i) {
         const float r = vertex_spacing[i];
         if (!(r > 0.0f) || !std::isfinite(r)) {
-            throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", r, " at vertex ", i,
-                                 ". It is in metres."));
+            throw ValueError(
+                str("poisson_points: spacing must be > 0 and finite, got ", r, " at vertex ", i, ". It is in metres."));
         }
         largest = std::max<double>(largest, r);
     }
     check_mesh(mesh, "Mesh");
-    return make_points(mesh, {largest, &vertex_spacing}, largest, options, progress);
+    Placed placed = place_points(mesh, {largest, &vertex_spacing}, largest, options, progress);
+    return finish(mesh, placed, largest, options.thin_walls, progress);
+}
+
+PointSet poisson_points_by_count(const Mesh& mesh, std::uint64_t count, const PoissonOptions& options,
+                                 Progress* progress) {
+    if (count == 0) throw ValueError("poisson_points: count must be > 0, got 0. Ask for one point or more.");
+    check_mesh(mesh, "Mesh");
+    PoissonOptions bounded = options;
+    if (bounded.max_points == 0) bounded.max_points = static_cast<std::uint64_t>(point_limit(0));
+    if (double(count) > double(bounded.max_points)) {
+        throw ValueError(str("poisson_points: count must be <= ", bounded.max_points, ", got ", count,
+                             ". More do not fit into the memory that is free, or max_points."));
+    }
+    // While looking, a first guess may be off by much where walls crowd each other.
+    bounded.max_points = std::max<std::uint64_t>(4 * bounded.max_points, 10000);
+
+    const double area = surface_area(mesh);
+    double spacing = area > 0.0 ? std::sqrt(0.71 * area / double(count)) : 1.0;
+    double fewer = 0.0, more = 0.0;  // spacings known to give too few and too many points
+    std::size_t nearest = 0;
+    constexpr int kMostTries = 60;
+    for (int attempt = 0; attempt < kMostTries; ++attempt) {
+        Placed placed = place_points(mesh, {spacing, nullptr}, spacing, bounded, progress);
+        const std::size_t got = placed.count();
+        const double error = std::abs(double(got) - double(count));
+        if (error <= 0.005 * double(count)) return finish(mesh, placed, spacing, options.thin_walls, progress);
+        if (nearest == 0 || error < std::abs(double(nearest) - double(count))) nearest = got;
+        // Points go as 1 / spacing²; a guess outside of what is known goes to its middle.
+        (got < count ? fewer : more) = spacing;
+        spacing *= std::sqrt(double(got) / double(count));
+        const double low = std::min(fewer, more), high = std::max(fewer, more);
+        if (low > 0.0 && (attempt > 5 || spacing <= low || spacing >= high)) {
+            // The count is a random walk in the spacing: once the bracket is narrow, try around it.
+            const bool is_narrow = high / low < 1.0 + 1e-3;
+            spacing = is_narrow ? low * (0.97 + 0.06 * to_unit_float(hash(options.seed, std::uint32_t(attempt))))
+                                : std::sqrt(low * high);
+        }
+    }
+    throw ValueError(str("poisson_points: count must be one that some spacing gives within 0.5 %, got ", count,
+                         "; the nearest found is ", nearest, ". Ask for that, or give a spacing."));
 }
 
 }  // namespace frazil

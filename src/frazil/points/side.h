@@ -12,8 +12,13 @@ namespace frazil {
 
 inline constexpr float kSameSideCosine = 1e-6f;
 
+// The cosine that two normals on one side must exceed; any do where walls are not told apart.
+inline constexpr float least_cosine(bool thin_walls) {
+    return thin_walls ? kSameSideCosine : -4.0f;
+}
+
 inline bool is_same_side(const V3f& a, const V3f& b, bool thin_walls) {
-    return !thin_walls || a.x * b.x + a.y * b.y + a.z * b.z > kSameSideCosine;
+    return a.x * b.x + a.y * b.y + a.z * b.z > least_cosine(thin_walls);
 }
 
 }  // namespace frazil

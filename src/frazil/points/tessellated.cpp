@@ -43,11 +43,7 @@ PointSet tessellated_points(const Mesh& mesh, double edge_length) {
     }
     PointSet points;
     points.spacing = edge_length;
-    points.positions.resize(first.back());
-    points.normals.resize(first.back());
-    points.areas.resize(first.back());
-    points.triangles.resize(first.back());
-    points.barycentrics.resize(first.back());
+    resize(points, first.back());
     parallel_for(mesh.triangles.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto n = static_cast<int>(cuts(mesh, i, edge_length));
@@ -55,12 +51,14 @@ PointSet tessellated_points(const Mesh& mesh, double edge_length) {
             const V3i& t = mesh.triangles[i];
             const V3d a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
             const V3f normal = unit_normal(mesh, i);
-            const auto area = static_cast<float>(0.5 * triangle_cross(mesh, i).length() / (double(n) * n));
+            const double whole = 0.5 * triangle_cross(mesh, i).length();
+            const auto area = static_cast<float>(whole / (double(n) * n));
             std::size_t at = first[i];
             const auto put = [&](double u, double v) {
                 points.positions[at] = V3f(a * (1.0 - u - v) + b * u + c * v);
                 points.normals[at] = normal;
                 points.areas[at] = area;
+                points.triangle_areas[at] = static_cast<float>(whole);
                 points.triangles[at] = static_cast<std::int32_t>(i);
                 points.barycentrics[at++] = V2f(float(u), float(v));
             };

@@ -6,10 +6,11 @@
 namespace frazil {
 namespace {
 
-constexpr double kUniformDarts = 3.0;         // per spacing² of surface, before fragments are taken one by one
-constexpr float kLeafEdge = 1.0f / 32.0f;     // of the spacing: below it a part is closed exactly
-constexpr float kSafe = 1.0f - 2e-5f;         // float distances err by less than this
-constexpr double kGapTolerance = 1e-9;        // of the spacing
+constexpr double kLongestEdge = 1.5;       // of a fragment, in spacings
+constexpr double kUniformDarts = 3.0;      // per spacing² of surface, before fragments are taken one by one
+constexpr float kLeafEdge = 1.0f / 32.0f;  // of the spacing: below it a part is closed exactly
+constexpr float kSafe = 1.0f - 2e-5f;      // float distances err by less than this
+constexpr double kGapTolerance = 1e-9;     // of the spacing
 constexpr int kMostLanes = 32;
 
 }  // namespace
@@ -17,8 +18,8 @@ constexpr int kMostLanes = 32;
 // A part of a fragment and its squared distances to the points around it, a lane per point.
 struct TileFiller::Node {
     alignas(32) float d[3][kMostLanes];
-    V2f place[3];      // barycentrics in the fragment
-    float edge2[3];    // squared lengths of 01, 12, 20
+    V2f place[3];    // barycentrics in the fragment
+    float edge2[3];  // squared lengths of 01, 12, 20
     float radius[3];
     int lanes;
 
@@ -87,7 +88,7 @@ double TileFiller::spacing_at(std::int32_t triangle, const V2f& uv) const {
 }
 
 void TileFiller::fill(const TileFrame& frame, const std::int32_t* triangles, std::size_t triangle_count,
-                      const std::vector<const std::vector<Dart>*>& around, std::uint64_t key, double largest_radius,
+                      const std::vector<const std::vector<Dart>*>& around, std::uint64_t key,
                       std::vector<Dart>& darts) {
     frame_ = frame;
     tile_seed_ = hash(seed_, hash(std::uint32_t(key), std::uint32_t(key >> 32)));
@@ -98,8 +99,9 @@ void TileFiller::fill(const TileFrame& frame, const std::int32_t* triangles, std
         append_fragments(mesh_, spacing_, frame, triangles[i], kLongestEdge, fragments_);
     }
 
-    const double reach = kReach * largest_radius;
-    near_.reset(frame.size, largest_radius, reach);
+    float reach = 0.0f;
+    for (const Fragment& fragment : fragments_) reach = std::max(reach, fragment_reach(fragment));
+    near_.reset(frame.size, kCellWidth * reach, reach, least_cosine(thin_walls_));
     for (const Fragment& fragment : fragments_) {
         V3f low = fragment.corners[0], high = low;
         for (const V3f& corner : fragment.corners) {
@@ -147,12 +149,8 @@ void TileFiller::throw_darts() {
         }
         const V3f place = fragment.corners[0] * (1.0f - u - v) + fragment.corners[1] * u + fragment.corners[2] * v;
         const float r = fragment.radii[0] * (1.0f - u - v) + fragment.radii[1] * u + fragment.radii[2] * v;
-        const float limit = r * r * kSafe;
-        const bool is_taken = near_.any_near(place, [&](std::uint32_t p) {
-            return (near_.locals[p] - place).length2() < limit &&
-                   is_same_side(near_.normals[p], fragment.normal, thin_walls_);
-        });
-        if (!is_taken) try_place(fragment, u, v, false);
+        if (!near_.any_near(place, fragment.normal, r * r * kSafe, [](std::uint32_t) { return true; }))
+            try_place(fragment, u, v, false);
     }
 }
 
@@ -166,20 +164,17 @@ void TileFiller::cover(const Fragment& fragment) {
 bool TileFiller::gather(const Fragment& f, Node& root) {
     root.lanes = 0;
     const V3f centroid = (f.corners[0] + f.corners[1] + f.corners[2]) * (1.0f / 3.0f);
-    float limit[3], longest_radius = 0.0f, extent2 = 0.0f;
+    float limit[3];
     for (int k = 0; k < 3; ++k) {
         const int next = k == 2 ? 0 : k + 1;
         root.place[k] = V2f(k == 1, k == 2);
         root.radius[k] = f.radii[k];
         root.edge2[k] = (f.corners[next] - f.corners[k]).length2();
         limit[k] = f.radii[k] * f.radii[k] * kSafe;
-        longest_radius = std::max(longest_radius, f.radii[k]);
-        extent2 = std::max(extent2, (f.corners[k] - centroid).length2());
     }
-    const float reach = (longest_radius + std::sqrt(extent2)) * 1.0001f, reach2 = reach * reach;
-    const bool is_covered = near_.any_near(centroid, [&](std::uint32_t p) {
+    const float reach = fragment_reach(f);
+    const bool is_covered = near_.any_near(centroid, f.normal, reach * reach, [&](std::uint32_t p) {
         const V3f& place = near_.locals[p];
-        if ((place - centroid).length2() > reach2 || !is_same_side(near_.normals[p], f.normal, thin_walls_)) return false;
         const float d0 = (f.corners[0] - place).length2(), d1 = (f.corners[1] - place).length2(),
                     d2 = (f.corners[2] - place).length2();
         if (d0 <= limit[0] && d1 <= limit[1] && d2 <= limit[2]) return true;
@@ -245,12 +240,10 @@ TileFiller::Outcome TileFiller::close_gap(const Fragment& f, const Node& node) {
     }
     const double reach = (radius + std::sqrt(extent2)) * 1.0001;
     candidates_.clear();
-    near_.any_near(V3f(centroid), [&](std::uint32_t p) {
-        if (!is_same_side(near_.normals[p], f.normal, thin_walls_)) return false;
+    near_.any_near(V3f(centroid), f.normal, float(reach * reach), [&](std::uint32_t p) {
         const V3d place = frame_.to_local(near_.worlds[p]);
-        if ((place - centroid).length2() > reach * reach) return false;
-        candidates_.push_back({{(corners[0] - place).length2(), (corners[1] - place).length2(),
-                                (corners[2] - place).length2()}});
+        candidates_.push_back(
+            {{(corners[0] - place).length2(), (corners[1] - place).length2(), (corners[2] - place).length2()}});
         return false;
     });
 
@@ -258,7 +251,9 @@ TileFiller::Outcome TileFiller::close_gap(const Fragment& f, const Node& node) {
     PiecePlace gap{1.0 / 3.0, 1.0 / 3.0};
     const int count = static_cast<int>(candidates_.size());
     if (count == 0) worst = 1.0;
-    drop_dominated(candidates_.data(), count, kept_);
+    int nearest[3];
+    find_nearest(candidates_.data(), count, nearest);
+    drop_dominated(candidates_.data(), count, nearest, kept_);
     Piece piece;
     for (const int self : kept_) {
         clip_piece(candidates_.data(), kept_, self, piece);
@@ -314,10 +309,10 @@ bool TileFiller::try_place(const Fragment& f, double u, double v, bool may_shift
 
 bool TileFiller::is_free(const V3f& world, const V3f& near, const V3f& normal, double radius) const {
     const V3d place(world);
-    return !near_.any_near(near, [&](std::uint32_t p) {
-        return (V3d(near_.worlds[p]) - place).length2() < radius * radius &&
-               is_same_side(near_.normals[p], normal, thin_walls_);
-    });
+    // Look a little farther than the spacing, by what rounding may have moved the place.
+    const float seen = float(radius / frame_.unit) * 1.005f + float((frame_.to_local(world) - V3d(near)).length());
+    return !near_.any_near(near, normal, seen * seen,
+                           [&](std::uint32_t p) { return (V3d(near_.worlds[p]) - place).length2() < radius * radius; });
 }
 
 }  // namespace frazil

@@ -25,9 +25,18 @@ struct Dart {
     V2f uv;
 };
 
-// The longest edge of a fragment beside the spacing, and how far from a fragment's centroid the points can lie that matter.
-inline constexpr double kLongestEdge = 1.0;
-inline constexpr double kReach = 1.0 + kCentroidReach * kLongestEdge + 0.01;
+// How far from a fragment's centroid the points can lie that matter to it.
+inline float fragment_reach(const Fragment& f) {
+    const V3f centroid = (f.corners[0] + f.corners[1] + f.corners[2]) * (1.0f / 3.0f);
+    float extent2 = 0.0f, radius = 0.0f;
+    for (int k = 0; k < 3; ++k) {
+        extent2 = std::max(extent2, (f.corners[k] - centroid).length2());
+        radius = std::max(radius, f.radii[k]);
+    }
+    return (radius * 1.01f + std::sqrt(extent2)) * 1.001f;
+}
+
+inline constexpr double kCellWidth = 0.8;  // of the cells of points, beside the reach of look-ups
 
 class TileFiller {
   public:
@@ -35,10 +44,8 @@ class TileFiller {
         : mesh_(mesh), spacing_(spacing), thin_walls_(thin_walls), seed_(seed) {}
 
     // Cover the fragments of the tile's triangles; `around` are the points of the tiles around it, `key` names the tile.
-    // `largest_radius` is the largest spacing, in the tile's unit.
     void fill(const TileFrame& frame, const std::int32_t* triangles, std::size_t triangle_count,
-              const std::vector<const std::vector<Dart>*>& around, std::uint64_t key, double largest_radius,
-              std::vector<Dart>& darts);
+              const std::vector<const std::vector<Dart>*>& around, std::uint64_t key, std::vector<Dart>& darts);
 
   private:
     struct Node;

@@ -1,53 +1,20 @@
 #include <bit>
-#include <atomic>
-#include <cstdlib>
-#include <cstdio>
 #include <cmath>
 
 #include "frazil/base/error.h"
 #include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
+#include "frazil/base/radix_sort.h"
 #include "frazil/translucency/gather_kernel.h"
+#include "frazil/translucency/opening_rule.h"
 #include "frazil/translucency/point_tree_data.h"
 
 namespace frazil {
 namespace {
 
-// How large a cluster may be at a distance: a table over octaves of u = 1 + q/z0², four a piece.
-class OpeningRule {
-  public:
-    OpeningRule(const Profile& profile, const KernelTable& table, float tolerance)
-        : inverse_z0_squared_(table.inverse_z0_squared) {
-        const double z0 = 1.0 / std::sqrt(double(inverse_z0_squared_));
-        for (int i = 0; i < kEntries; ++i) {
-            const double u = std::ldexp(1.0 + (i % 4) / 4.0, i / 4), r = z0 * std::sqrt(u - 1.0);
-            double limit = 1e30;
-            for (int c = 0; c < 3; ++c) {
-                const double total = albedo(profile, c), f = reflectance(profile, c, r);
-                if (!(total > 0.0 && f > 0.0)) continue;
-                const double step = 0.01 * (r + z0);
-                const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
-                const double bend = 1.5 / std::hypot(r, mean_free_path(profile, c)) + decay;
-                const double share = std::min(1.0, 6.0 * r * r * f / total + 6.0 * z0 * z0 * f / total);
-                const double allowed = tolerance / std::sqrt(std::max(share, 1e-12));
-                limit = std::min(limit, std::cbrt(4.0 * allowed) / bend);
-            }
-            largest_[i] = static_cast<float>(limit);
-        }
-    }
-
-    // The largest radius of a cluster at squared distance q.
-    float largest_radius(float q) const {
-        const float u = 1.0f + q * inverse_z0_squared_;
-        const std::uint32_t bits = std::bit_cast<std::uint32_t>(u) - std::bit_cast<std::uint32_t>(1.0f);
-        return largest_[std::min<std::uint32_t>(bits >> 21, kEntries - 1)];
-    }
-
-  private:
-    static constexpr int kEntries = 128;
-    float inverse_z0_squared_;
-    std::array<float, kEntries> largest_;
-};
+constexpr std::size_t kBlockStep = 16;
+constexpr float kWidestBlock = 4.0f;  // in mean free paths, beyond kBlockStep shading points
+constexpr float kDiscShare = 0.05f;   // of a cluster's largest squared radius that a single footprint may have
 
 float squared_distance(const Box3f& box, const V3f& p) {
     float q = 0.0f;
@@ -58,29 +25,34 @@ float squared_distance(const Box3f& box, const V3f& p) {
     return q;
 }
 
+// Chooses the clusters and points that stand for the surface as seen from a block of shading points.
 struct Cut {
     const PointTree::Impl& tree;
-    const OpeningRule& rule;
-    Estimator estimator;
+    const OpeningRule* rule;
+    bool has_footprints;
     SourceList list;
     std::vector<std::uint32_t> stack;
 
     void add_powers(const float* powers, float scale) {
-        for (std::size_t c = 0; c < 3 * tree.groups; ++c) list.powers.push_back(powers[c] * scale);
+        const std::size_t row = 3 * tree.groups, old = list.powers.size();
+        list.powers.resize(old + row);
+        Source& source = list.sources.back();
+        for (std::size_t c = 0; c < row; ++c) {
+            list.powers[old + c] = powers[c] * scale;
+            source.power[c % 3] += std::abs(powers[c] * scale);
+        }
     }
 
     void add_cluster(std::uint32_t index) {
         const TreeNode& node = tree.nodes[index];
-        const float trace = node.covariance[0] + node.covariance[1] + node.covariance[2];
-        float scale = 1.0f;
-        if (estimator == Estimator::noise_free && trace > 0.0f) scale += 2.0f * node.footprint / trace;
-        Source source;
+        const NodeMoments& moments = tree.moments[index];
+        const float scale = has_footprints && node.trace > 0.0f ? 1.0f + 2.0f * node.footprint / node.trace : 1.0f;
+        Source& source = list.sources.emplace_back();
         source.center = {node.center.x, node.center.y, node.center.z};
-        for (int i = 0; i < 6; ++i) source.covariance[i] = node.covariance[i] * (i < 3 ? scale : 2.0f * scale);
-        source.trace = trace * scale;
-        source.power_offset = {2.0f * node.power_offset.x, 2.0f * node.power_offset.y, 2.0f * node.power_offset.z};
-        source.area = node.area;
-        list.sources.push_back(source);
+        for (int i = 0; i < 6; ++i) source.covariance[i] = moments.covariance[i] * scale;
+        source.trace = node.trace * scale;
+        source.power_offset = moments.power_offset;
+        source.area = moments.area;
         add_powers(&tree.node_powers[index * 3 * tree.groups], 1.0f);
     }
 
@@ -88,26 +60,38 @@ struct Cut {
     void add_disc(std::uint32_t p, const V3f& center, float share) {
         const float area = tree.areas[p] * share;
         const V3f& n = tree.normals[p];
-        const float v = estimator == Estimator::noise_free ? 0.25f * area * kInvPi : 0.0f;
+        const float v = has_footprints ? 0.25f * area * kInvPi : 0.0f;
         list.sources.push_back({{center.x, center.y, center.z},
                                 {v * (1.0f - n.x * n.x), v * (1.0f - n.y * n.y), v * (1.0f - n.z * n.z),
                                  -2.0f * v * n.x * n.y, -2.0f * v * n.x * n.z, -2.0f * v * n.y * n.z},
                                 2.0f * v,
                                 {0.0f, 0.0f, 0.0f},
-                                area});
+                                area,
+                                {0.0f, 0.0f, 0.0f}});
         add_powers(&tree.irradiance[p * tree.groups].x, area);
     }
 
     // A disc that is large against the kernel is cut into seven of equal area with the same second moments together.
-    void add_split_disc(std::uint32_t p, const V3f& center, float share, float largest) {
-        const float radius = footprint_radius(tree.areas[p] * share);
-        if (radius <= largest || share < 1e-3f) return add_disc(p, center, share);
+    void add_split_disc(std::uint32_t p, const V3f& center, float share, float largest_squared) {
+        const float squared = tree.areas[p] * share * kInvPi;  // of the radius; the trace is half of it
+        if (squared <= largest_squared || share < 1e-3f) return add_disc(p, center, share);
         const auto [tangent, bitangent] = tangent_frame(tree.normals[p]);
-        add_split_disc(p, center, share / 7.0f, largest);
+        add_split_disc(p, center, share / 7.0f, largest_squared);
         for (int k = 0; k < 6; ++k) {
-            const float angle = k * kPi / 3.0f, reach = radius * 0.70710678f;
+            const float angle = k * kPi / 3.0f, reach = std::sqrt(0.5f * squared);
             add_split_disc(p, center + tangent * (reach * std::cos(angle)) + bitangent * (reach * std::sin(angle)),
-                           share / 7.0f, largest);
+                           share / 7.0f, largest_squared);
+        }
+    }
+
+    void add_points(const TreeNode& leaf, const Box3f& box) {
+        for (std::uint32_t p = leaf.first; p < leaf.first + leaf.size(); ++p) {
+            if (has_footprints) {
+                const float q = squared_distance(box, tree.positions[p]);
+                add_split_disc(p, tree.positions[p], 1.0f, kDiscShare * rule->largest_squared(q));
+            } else {
+                add_disc(p, tree.positions[p], 1.0f);
+            }
         }
     }
 
@@ -121,25 +105,70 @@ struct Cut {
             const float q = squared_distance(box, node.center);
             const float beyond = node.radius + tree.table.reach;
             if (q > beyond * beyond) continue;
-            const float largest = rule.largest_radius(q);
-            const float reach = estimator == Estimator::noise_free ? 2.0f * std::sqrt(node.footprint) : 0.0f;
-            if (node.point_count > 1 && node.radius + reach <= largest) {
+            const float squared = node.radius * node.radius + (has_footprints ? 4.0f * node.footprint : 0.0f);
+            if (squared <= rule->largest_squared(q) && (!node.is_leaf() || node.size() > 1)) {
                 add_cluster(index);
-            } else if (node.child_count > 0) {
-                for (std::uint32_t k = node.child_count; k-- > 0;) stack.push_back(node.first_child + k);
+            } else if (node.is_leaf()) {
+                add_points(node, box);
             } else {
-                for (std::uint32_t p = node.first_point; p < node.first_point + node.point_count; ++p) {
-                    if (estimator == Estimator::sum) {
-                        add_disc(p, tree.positions[p], 1.0f);
-                    } else {
-                        const float q = squared_distance(box, tree.positions[p]);
-                        add_split_disc(p, tree.positions[p], 1.0f, 0.7f * rule.largest_radius(q));
-                    }
-                }
+                for (std::uint32_t k = node.size(); k-- > 0;) stack.push_back(node.first + k);
             }
         }
     }
 };
+
+// Irradiance that arrives, against what the coverage would bring of the mean irradiance: steps of it.
+constexpr std::array<double, 4> kDarkness = {1.0, 0.1, 0.01, 0.001};
+
+// Which of these a block needs: the darkest channel and shading point decide, all groups' light together.
+std::size_t darkness_level(const PointTree::Impl& tree, const BlockSums& block) {
+    float darkest = 1.0f;
+    for (std::size_t c = 0; c < 3; ++c) {
+        float mean = 0.0f;
+        for (std::size_t g = 0; g < tree.groups; ++g) mean += std::abs(tree.node_powers[3 * g + c]);
+        if (!(mean > 0.0f)) continue;
+        mean /= tree.moments[0].area;
+        for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+            const float expected = mean * block.coverage[c][lane], arrives = std::abs(block.unshaded[c][lane]);
+            if (arrives < darkest * expected) darkest = arrives / expected;
+        }
+    }
+    std::size_t level = 0;
+    while (level + 1 < kDarkness.size() && darkest < 2.0 * kDarkness[level + 1]) ++level;
+    return level;
+}
+
+// The shading points that the tree reaches, along a Morton curve; to the rest belongs exactly nothing.
+std::vector<KeyedIndex> sorted_positions(const PointTree::Impl& tree, const V3f* positions, std::size_t count) {
+    constexpr std::size_t grain = 8192;
+    constexpr int kBits = 33, kDropped = 3 * kMortonBits - kBits;
+    constexpr std::uint64_t kOutside = std::uint64_t(1) << kBits;
+    std::vector<KeyedIndex> keys(count), scratch;
+    const MortonGrid grid(tree.bounds);
+    const float reach = tree.table.reach + tree.bounds.size().length() * 1e-3f;
+    std::vector<std::size_t> outside((count + grain - 1) / grain, 0);
+    parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (!is_finite(positions[i])) {
+                throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at row ", i, "."));
+            }
+            const bool is_outside = squared_distance(tree.bounds, positions[i]) > reach * reach;
+            keys[i] = {is_outside ? kOutside : grid.code(positions[i]) >> kDropped, static_cast<std::uint32_t>(i)};
+            outside[begin / grain] += is_outside;
+        }
+    });
+    radix_sort(keys, kBits + 1, scratch);
+    std::size_t inside = count;
+    for (const std::size_t n : outside) inside -= n;
+    keys.resize(inside);
+    return keys;
+}
+
+void copy_exitance(const BlockSums& block, std::size_t lane, std::size_t groups, Rgb* to) {
+    for (std::size_t g = 0; g < groups; ++g) {
+        for (std::size_t c = 0; c < 3; ++c) to[g][c] = block.exitance[(3 * g + c) * kBlockLanes + lane];
+    }
+}
 
 }  // namespace
 
@@ -152,49 +181,73 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     out.groups = tree.groups;
     out.exitance.assign(count * tree.groups, Rgb(0.0f));
     out.coverage.assign(count, Rgb(0.0f));
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!is_finite(positions[i])) {
-            throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at row ", i, "."));
-        }
+    if (options.ramp_layers && tree.ramp.is_empty()) {
+        throw ValueError("PointTree: ramp_layers must be off without a ramp, got on. Give the tree a ramp.");
     }
-    if (tree.nodes.empty() || count == 0) return out;
+    if (options.ramp_layers) out.knots = tree.ramp.distances.size();
+    out.layers.assign(count * out.knots * tree.groups, Rgb(0.0f));
+    if (count == 0) return out;
+    const std::vector<KeyedIndex> order = sorted_positions(tree, positions, count);
+    if (tree.nodes.empty()) return out;
 
-    // Bring the shading points into Morton order, so that a block of them lies together.
-    const MortonGrid grid(tree.bounds);
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
-    order.reserve(count);
-    const float reach = tree.table.reach + tree.bounds.size().length() * 1e-3f;
-    for (std::size_t i = 0; i < count; ++i) {
-        if (squared_distance(tree.bounds, positions[i]) > reach * reach) continue;  // exactly zero
-        order.emplace_back(grid.code(positions[i]), static_cast<std::uint32_t>(i));
-    }
-    std::sort(order.begin(), order.end());
-
-    const OpeningRule rule(tree.profile, tree.table, options.tolerance);
+    // One rule for lit places, and stricter ones for the darker.
+    std::vector<OpeningRule> rules;
+    for (const double darkness : kDarkness)
+        rules.emplace_back(tree.profile, tree.table, !tree.ramp.is_empty(), options.tolerance, darkness);
     const RampHinges ramp = hinges_of(tree.ramp, tree.ramp_scale);
-    constexpr std::size_t block_size = 16;
-    parallel_for(order.size(), block_size, [&](std::size_t begin, std::size_t end) {
-        Cut cut{tree, rule, options.estimator, {}, {}};
+    std::vector<RampHinges> hats;
+    for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(tree.ramp, k), Rgb(1.0f)));
+    const float widest = kWidestBlock / std::sqrt(tree.table.inverse_z0_squared);
+    parallel_for(order.size(), 8 * kBlockLanes, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+        Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free, {}, {}};
         BlockSums block;
-        block.lanes = end - begin;
-        block.exitance.assign(3 * tree.groups * kBlockLanes, 0.0f);
-        Box3f box;
-        for (std::size_t i = begin; i < end; ++i) {
-            const V3f& p = positions[order[i].second];
-            block.x[i - begin] = p.x;
-            block.y[i - begin] = p.y;
-            block.z[i - begin] = p.z;
-            box.extendBy(p);
-        }
-        cut.build(box);
-        if (getenv("FZDBG")) { static std::atomic<long> n{0}, b{0}; n += cut.list.sources.size(); if (++b % 2000 == 0) fprintf(stderr, "src/block %ld size %g\n", long(n)/long(b), box.size().length()); }
-        add_sources(tree.table, ramp, cut.list, tree.groups, block);
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::size_t lane = i - begin, to = order[i].second;
-            for (int c = 0; c < 3; ++c) {
-                out.coverage[to][c] = block.coverage[c][lane];
-                for (std::size_t g = 0; g < tree.groups; ++g) {
-                    out.exitance[to * tree.groups + g][c] = block.exitance[(3 * g + c) * kBlockLanes + lane];
+        std::size_t level = 0;
+        for (std::size_t begin = chunk_begin; begin < chunk_end; begin += block.lanes) {
+            // A block is up to kBlockLanes shading points that lie near each other.
+            const std::size_t most = std::min(kBlockLanes, chunk_end - begin);
+            Box3f box;
+            for (block.lanes = 0; block.lanes < most;) {
+                const std::size_t next = std::min(most, block.lanes + kBlockStep);
+                Box3f wider = box;
+                for (std::size_t lane = block.lanes; lane < next; ++lane) {
+                    const V3f& p = positions[order[begin + lane].index];
+                    block.x[lane] = p.x;
+                    block.y[lane] = p.y;
+                    block.z[lane] = p.z;
+                    wider.extendBy(p);
+                }
+                if (block.lanes > 0 && wider.size().length() > widest) break;
+                box = wider;
+                block.lanes = next;
+            }
+            for (std::size_t lane = block.lanes; lane < kBlockLanes; ++lane) {
+                block.x[lane] = block.x[0];
+                block.y[lane] = block.y[0];
+                block.z[lane] = block.z[0];
+            }
+            // Gather by the rule of the block before; again where it proves too lax here.
+            for (;;) {
+                block.clear(tree.groups);
+                cut.rule = &rules[level];
+                cut.build(box);
+                add_sources(tree.table, ramp, cut.list, tree.groups, block);
+                const std::size_t wanted = darkness_level(tree, block);
+                const bool is_enough = wanted <= level;
+                level = wanted;
+                if (is_enough) break;
+            }
+            for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+                const std::size_t to = order[begin + lane].index;
+                for (int c = 0; c < 3; ++c) out.coverage[to][c] = block.coverage[c][lane];
+                copy_exitance(block, lane, tree.groups, &out.exitance[to * tree.groups]);
+            }
+            // The same cut once more for every knot of the ramp.
+            for (std::size_t k = 0; k < hats.size(); ++k) {
+                block.clear(tree.groups);
+                add_sources(tree.table, hats[k], cut.list, tree.groups, block);
+                for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+                    const std::size_t to = order[begin + lane].index;
+                    copy_exitance(block, lane, tree.groups, &out.layers[(to * out.knots + k) * tree.groups]);
                 }
             }
         }

@@ -1,10 +1,11 @@
 #include "frazil/translucency/point_tree.h"
 
-#include <numeric>
+#include <bit>
 
 #include "frazil/base/error.h"
 #include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
+#include "frazil/base/radix_sort.h"
 #include "frazil/translucency/point_tree_data.h"
 
 namespace frazil {
@@ -24,90 +25,214 @@ void check_points(const PointSet& points, std::size_t irradiance_count, std::siz
         throw ValueError(str("PointTree: irradiance must have one row per point (", n, " x ", groups, " groups), got ",
                              irradiance_count, " values."));
     }
-    for (std::size_t k = 0; k < n; ++k) {
-        if (!is_finite(points.positions[k])) {
-            throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at point ", k, "."));
-        }
-        if (!(points.areas[k] >= 0.0f && std::isfinite(points.areas[k]))) {
-            throw ValueError(
-                str("PointTree: areas must be >= 0 and finite, got ", points.areas[k], " at point ", k, "."));
-        }
-    }
-}
-
-struct Keyed {
-    std::uint64_t code;
-    std::uint32_t index;
-};
-
-// Sort by code; equal codes keep the order of their indices.
-void sort_by_code(std::vector<Keyed>& keys) {
-    std::sort(keys.begin(), keys.end(),
-              [](const Keyed& a, const Keyed& b) { return a.code != b.code ? a.code < b.code : a.index < b.index; });
-}
-
-// Split nodes at the bits of their codes, level by level. Returns where each level begins.
-std::vector<std::uint32_t> split_nodes(const std::vector<Keyed>& keys, std::vector<TreeNode>& nodes) {
-    std::vector<std::uint32_t> level_begin{0};
-    nodes.resize(1);
-    nodes[0].point_count = static_cast<std::uint32_t>(keys.size());
-    std::vector<std::uint8_t> depth{0};
-    for (std::uint32_t begin = 0; begin < nodes.size();) {
-        const auto end = static_cast<std::uint32_t>(nodes.size());
-        for (std::uint32_t n = begin; n < end; ++n) {
-            const std::uint32_t first = nodes[n].first_point, last = first + nodes[n].point_count;
-            if (nodes[n].point_count <= kLeafPoints) continue;
-            // Skip the levels on which all points lie in one octant.
-            const std::uint64_t differing = keys[first].code ^ keys[last - 1].code;
-            if (differing == 0) continue;
-            const int shift = 3 * ((63 - __builtin_clzll(differing)) / 3);
-            nodes[n].first_child = static_cast<std::uint32_t>(nodes.size());
-            for (std::uint32_t p = first; p < last;) {
-                const std::uint64_t octant = keys[p].code >> shift;
-                const auto next = std::partition_point(keys.begin() + p, keys.begin() + last,
-                                                       [&](const Keyed& k) { return k.code >> shift == octant; });
-                TreeNode child;
-                child.first_point = p;
-                child.point_count = static_cast<std::uint32_t>(next - keys.begin()) - p;
-                nodes.push_back(child);
-                ++nodes[n].child_count;
-                p += child.point_count;
+    parallel_for(n, 8192, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            if (!is_finite(points.positions[k])) {
+                throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at point ", k, "."));
+            }
+            if (!(points.areas[k] >= 0.0f && std::isfinite(points.areas[k]))) {
+                throw ValueError(
+                    str("PointTree: areas must be >= 0 and finite, got ", points.areas[k], " at point ", k, "."));
             }
         }
+    });
+}
+
+struct Range {
+    std::uint32_t first, count;
+};
+
+// Split nodes at the bits of their codes, level by level, and give every node its points. Returns where levels begin.
+std::vector<std::uint32_t> split_nodes(const std::vector<KeyedIndex>& keys, std::vector<TreeNode>& nodes,
+                                       std::vector<Range>& ranges) {
+    std::vector<std::uint32_t> level_begin{0};
+    ranges.assign(1, {0, static_cast<std::uint32_t>(keys.size())});
+    nodes.resize(1);
+    std::vector<std::array<std::uint32_t, 9>> cuts;  // where the children of a node begin and end
+    std::vector<std::uint32_t> child_counts;
+    for (std::uint32_t begin = 0; begin < nodes.size();) {
+        const auto end = static_cast<std::uint32_t>(nodes.size());
+        cuts.resize(end - begin);
+        child_counts.assign(end - begin, 0);
+        parallel_for(end - begin, 256, [&](std::size_t from, std::size_t to) {
+            for (std::size_t i = from; i < to; ++i) {
+                const std::uint32_t first = ranges[begin + i].first, last = first + ranges[begin + i].count;
+                const std::uint64_t differing = keys[first].key ^ keys[last - 1].key;
+                if (last - first <= kLeafPoints || differing == 0) continue;
+                // Skip the levels on which all points lie in one octant.
+                const int shift = 3 * ((63 - std::countl_zero(differing)) / 3);
+                auto& cut = cuts[i];
+                std::uint32_t children = 0;
+                for (std::uint32_t p = first; p < last; ++children) {
+                    cut[children] = p;
+                    const std::uint64_t octant = keys[p].key >> shift;
+                    p = static_cast<std::uint32_t>(
+                        std::partition_point(keys.begin() + p, keys.begin() + last,
+                                             [&](const KeyedIndex& k) { return k.key >> shift == octant; }) -
+                        keys.begin());
+                }
+                cut[children] = last;
+                child_counts[i] = children;
+            }
+        });
+        std::uint32_t next = end;
+        for (std::uint32_t i = 0; i < end - begin; ++i) {
+            TreeNode& node = nodes[begin + i];
+            if (child_counts[i] == 0) {
+                node.first = ranges[begin + i].first;
+                node.count = ranges[begin + i].count | TreeNode::kLeafBit;
+            } else {
+                node.first = next;
+                node.count = child_counts[i];
+                next += child_counts[i];
+            }
+        }
+        nodes.resize(next);
+        ranges.resize(next);
+        parallel_for(end - begin, 256, [&](std::size_t from, std::size_t to) {
+            for (std::size_t i = from; i < to; ++i) {
+                for (std::uint32_t k = 0; k < child_counts[i]; ++k) {
+                    ranges[nodes[begin + i].first + k] = {cuts[i][k], cuts[i][k + 1] - cuts[i][k]};
+                }
+            }
+        });
         begin = end;
         level_begin.push_back(begin);
     }
     return level_begin;
 }
 
-// Area, power and moments of a node from its parts: points of a leaf, or children.
-struct Moments {
+// Sums over the parts of a node, points of a leaf or children, about a place near them.
+struct MomentSums {
     double area = 0.0, footprint = 0.0, power = 0.0;
     V3d first{0.0}, power_first{0.0};
-    std::array<double, 6> second{};  // about the origin `about`
+    std::array<double, 6> second{};
 
-    void add(double weight, const V3d& d) {
+    void add_area(double weight, const V3d& d) {
         area += weight;
         first += d * weight;
         second[0] += weight * d.x * d.x;
         second[1] += weight * d.y * d.y;
         second[2] += weight * d.z * d.z;
-        second[3] += weight * d.x * d.y;
-        second[4] += weight * d.x * d.z;
-        second[5] += weight * d.y * d.z;
+        second[3] += 2.0 * weight * d.x * d.y;
+        second[4] += 2.0 * weight * d.x * d.z;
+        second[5] += 2.0 * weight * d.y * d.z;
+    }
+
+    void add_power(double weight, const V3d& d) {
+        power += weight;
+        power_first += d * weight;
     }
 };
 
-void finish(const Moments& m, const V3d& about, TreeNode& node) {
-    const double inverse = m.area > 0.0 ? 1.0 / m.area : 0.0;
-    const V3d mean = m.first * inverse;
+void finish(const MomentSums& sums, const V3d& about, TreeNode& node, NodeMoments& moments) {
+    const double inverse = sums.area > 0.0 ? 1.0 / sums.area : 0.0;
+    const V3d mean = sums.first * inverse;
     node.center = V3f(about + mean);
-    node.area = static_cast<float>(m.area);
-    const double product[6] = {mean.x * mean.x, mean.y * mean.y, mean.z * mean.z,
-                               mean.x * mean.y, mean.x * mean.z, mean.y * mean.z};
-    for (int i = 0; i < 6; ++i) node.covariance[i] = static_cast<float>(m.second[i] * inverse - product[i]);
-    node.footprint = static_cast<float>(m.footprint * inverse);
-    node.power_offset = m.power > 0.0 ? V3f(m.power_first / m.power - mean) : V3f(0.0f);
+    moments.area = static_cast<float>(sums.area);
+    const double product[6] = {mean.x * mean.x,       mean.y * mean.y,       mean.z * mean.z,
+                               2.0 * mean.x * mean.y, 2.0 * mean.x * mean.z, 2.0 * mean.y * mean.z};
+    for (int i = 0; i < 6; ++i) moments.covariance[i] = static_cast<float>(sums.second[i] * inverse - product[i]);
+    node.trace = std::max(0.0f, moments.covariance[0] + moments.covariance[1] + moments.covariance[2]);
+    node.footprint = static_cast<float>(sums.footprint * inverse);
+    const V3d offset = sums.power > 0.0 ? (sums.power_first / sums.power - mean) * 2.0 : V3d(0.0);
+    for (int i = 0; i < 3; ++i) moments.power_offset[i] = static_cast<float>(offset[i]);
+}
+
+// Areas, powers and moments of a leaf from its points.
+void sum_leaf(PointTree::Impl& tree, std::uint32_t n) {
+    TreeNode& node = tree.nodes[n];
+    const std::size_t row = 3 * tree.groups;
+    float* powers = &tree.node_powers[n * row];
+    const V3d about(tree.positions[node.first]);
+    MomentSums sums;
+    for (std::uint32_t p = node.first; p < node.first + node.size(); ++p) {
+        const V3d d = V3d(tree.positions[p]) - about;
+        const float area = tree.areas[p];
+        const float* e = &tree.irradiance[p * tree.groups].x;
+        float power = 0.0f;
+        for (std::size_t c = 0; c < row; ++c) {
+            powers[c] += e[c] * area;
+            power += std::abs(e[c] * area);
+        }
+        sums.add_area(area, d);
+        sums.footprint += double(area) * area / (4.0 * kPi);  // a disc's variance is a²/4 along each axis
+        sums.add_power(power, d);
+    }
+    finish(sums, about, node, tree.moments[n]);
+    float squared = 0.0f;
+    for (std::uint32_t p = node.first; p < node.first + node.size(); ++p) {
+        squared = std::max(squared, (tree.positions[p] - node.center).length2());
+    }
+    node.radius = std::sqrt(squared);
+}
+
+// The same for an inner node, from its children.
+void sum_children(PointTree::Impl& tree, std::uint32_t n) {
+    TreeNode& node = tree.nodes[n];
+    const std::size_t row = 3 * tree.groups;
+    float* powers = &tree.node_powers[n * row];
+    const V3d about(tree.nodes[node.first].center);
+    MomentSums sums;
+    for (std::uint32_t k = node.first; k < node.first + node.size(); ++k) {
+        const TreeNode& child = tree.nodes[k];
+        const NodeMoments& moments = tree.moments[k];
+        const V3d d = V3d(child.center) - about;
+        float power = 0.0f;
+        for (std::size_t c = 0; c < row; ++c) {
+            powers[c] += tree.node_powers[k * row + c];
+            power += std::abs(tree.node_powers[k * row + c]);
+        }
+        const double area = moments.area;
+        sums.add_area(area, d);
+        for (int j = 0; j < 6; ++j) sums.second[j] += area * moments.covariance[j];
+        sums.footprint += area * child.footprint;
+        const auto& offset = moments.power_offset;
+        sums.add_power(power, d + V3d(offset[0], offset[1], offset[2]) * 0.5);
+    }
+    finish(sums, about, node, tree.moments[n]);
+    for (std::uint32_t k = node.first; k < node.first + node.size(); ++k) {
+        const TreeNode& child = tree.nodes[k];
+        node.radius = std::max(node.radius, (child.center - node.center).length() + child.radius);
+    }
+}
+
+// The indices of points with finite irradiance and their Morton codes, sorted by code.
+std::vector<KeyedIndex> sorted_points(const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
+                                      Box3f& bounds) {
+    const std::size_t n = points.size();
+    constexpr std::size_t grain = 8192;
+    std::vector<std::uint32_t> good((n + grain - 1) / grain, 0);
+    std::vector<Box3f> boxes(good.size());
+    const auto is_good = [&](std::size_t k) {
+        bool all = true;
+        for (std::size_t g = 0; g < groups; ++g) all = all && is_finite(irradiance[k * groups + g]);
+        return all;
+    };
+    parallel_for(n, grain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            if (!is_good(k)) continue;
+            ++good[begin / grain];
+            boxes[begin / grain].extendBy(points.positions[k]);
+        }
+    });
+    std::uint32_t total = 0;
+    for (std::size_t chunk = 0; chunk < good.size(); ++chunk) {
+        bounds.extendBy(boxes[chunk]);
+        const std::uint32_t here = good[chunk];
+        good[chunk] = total;
+        total += here;
+    }
+    std::vector<KeyedIndex> keys(total), scratch;
+    const MortonGrid grid(bounds);
+    parallel_for(n, grain, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t to = good[begin / grain];
+        for (std::size_t k = begin; k < end; ++k) {
+            if (is_good(k)) keys[to++] = {grid.code(points.positions[k]), static_cast<std::uint32_t>(k)};
+        }
+    });
+    radix_sort(keys, 3 * kMortonBits, scratch);
+    return keys;
 }
 
 }  // namespace
@@ -124,24 +249,10 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
     tree.groups = groups;
     tree.spacing = points.spacing;
 
-    // Leave out points whose irradiance is not finite.
-    std::vector<Keyed> keys;
-    keys.reserve(points.size());
-    for (std::uint32_t k = 0; k < points.size(); ++k) {
-        bool is_good = true;
-        for (std::size_t g = 0; g < groups; ++g) is_good = is_good && is_finite(irradiance[k * groups + g]);
-        if (is_good) keys.push_back({0, k});
-    }
+    // Bring the points into Morton order.
+    std::vector<KeyedIndex> keys = sorted_points(points, irradiance, groups, tree.bounds);
     tree.dropped = points.size() - keys.size();
     if (keys.empty()) return;
-
-    // Sort into Morton order.
-    for (const Keyed& key : keys) tree.bounds.extendBy(points.positions[key.index]);
-    const MortonGrid grid(tree.bounds);
-    parallel_for(keys.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) keys[i].code = grid.code(points.positions[keys[i].index]);
-    });
-    sort_by_code(keys);
     const std::size_t n = keys.size();
     tree.positions.resize(n);
     tree.normals.resize(n);
@@ -158,57 +269,16 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
     });
 
     // Build the nodes downwards, their moments upwards.
-    const std::vector<std::uint32_t> level_begin = split_nodes(keys, tree.nodes);
-    const std::size_t row = 3 * groups;
-    tree.node_powers.assign(tree.nodes.size() * row, 0.0f);
+    std::vector<Range> ranges;
+    const std::vector<std::uint32_t> level_begin = split_nodes(keys, tree.nodes, ranges);
+    tree.nodes.shrink_to_fit();
+    tree.moments.resize(tree.nodes.size());
+    tree.node_powers.assign(tree.nodes.size() * 3 * groups, 0.0f);
     for (std::size_t level = level_begin.size() - 1; level-- > 0;) {
-        const std::uint32_t level_first = level_begin[level], count = level_begin[level + 1] - level_first;
-        parallel_for(count, 512, [&](std::size_t begin, std::size_t end) {
-            std::vector<double> powers(row);
-            for (std::size_t i = level_first + begin; i < level_first + end; ++i) {
-                TreeNode& node = tree.nodes[i];
-                const V3d about(tree.positions[node.first_point]);
-                std::fill(powers.begin(), powers.end(), 0.0);
-                Moments m;
-                if (node.child_count == 0) {
-                    for (std::uint32_t p = node.first_point; p < node.first_point + node.point_count; ++p) {
-                        const V3d d = V3d(tree.positions[p]) - about;
-                        const double area = tree.areas[p];
-                        double power = 0.0;
-                        for (std::size_t c = 0; c < row; ++c) {
-                            const double e = tree.irradiance[p * groups + c / 3][c % 3] * area;
-                            powers[c] += e;
-                            power += std::abs(e);
-                        }
-                        m.add(area, d);
-                        m.footprint += area * area / (4.0 * kPi);
-                        m.power += power;
-                        m.power_first += d * power;
-                    }
-                } else {
-                    for (std::uint32_t k = node.first_child; k < node.first_child + node.child_count; ++k) {
-                        const TreeNode& child = tree.nodes[k];
-                        const V3d d = V3d(child.center) - about;
-                        double power = 0.0;
-                        for (std::size_t c = 0; c < row; ++c) {
-                            const double e = tree.node_powers[k * row + c];
-                            powers[c] += e;
-                            power += std::abs(e);
-                        }
-                        m.add(child.area, d);
-                        for (int j = 0; j < 6; ++j) m.second[j] += double(child.area) * child.covariance[j];
-                        m.footprint += double(child.area) * child.footprint;
-                        m.power += power;
-                        m.power_first += (d + V3d(child.power_offset)) * power;
-                    }
-                }
-                finish(m, about, node);
-                for (std::size_t c = 0; c < row; ++c) tree.node_powers[i * row + c] = static_cast<float>(powers[c]);
-                float squared = 0.0f;
-                for (std::uint32_t p = node.first_point; p < node.first_point + node.point_count; ++p) {
-                    squared = std::max(squared, (tree.positions[p] - node.center).length2());
-                }
-                node.radius = std::sqrt(squared);
+        const std::uint32_t first = level_begin[level];
+        parallel_for(level_begin[level + 1] - first, 512, [&](std::size_t begin, std::size_t end) {
+            for (auto k = static_cast<std::uint32_t>(first + begin); k < first + end; ++k) {
+                tree.nodes[k].is_leaf() ? sum_leaf(tree, k) : sum_children(tree, k);
             }
         });
     }

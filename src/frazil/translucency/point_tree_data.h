@@ -16,15 +16,25 @@
 
 namespace frazil {
 
+// What a traversal looks at.
 struct TreeNode {
-    V3f center{0.0f};                   // of area
-    std::array<float, 6> covariance{};  // of area: xx, yy, zz, xy, xz, yz
-    V3f power_offset{0.0f};             // centre of power (summed over groups and channels) - center
+    V3f center{0.0f};         // of area
+    float radius = 0.0f;      // of a sphere about center that holds all points
+    float trace = 0.0f;       // of the covariance of area: mean squared distance from center
+    float footprint = 0.0f;   // variance along each tangent that the points' own footprints add
+    std::uint32_t first = 0;  // child, or point of a leaf
+    std::uint32_t count = 0;  // children, or points of a leaf with kLeafBit
+
+    static constexpr std::uint32_t kLeafBit = 1u << 31;
+    bool is_leaf() const { return (count & kLeafBit) != 0; }
+    std::uint32_t size() const { return count & ~kLeafBit; }
+};
+
+// What an evaluation needs besides.
+struct NodeMoments {
     float area = 0.0f;
-    float footprint = 0.0f;                          // variance along each tangent that the points' own footprints add
-    float radius = 0.0f;                             // of the sphere about center that holds all points
-    std::uint32_t first_child = 0, child_count = 0;  // no children: a leaf
-    std::uint32_t first_point = 0, point_count = 0;
+    std::array<float, 6> covariance{};    // of area: xx, yy, zz, and twice xy, xz, yz
+    std::array<float, 3> power_offset{};  // twice the way from center to the centre of power over all groups
 };
 
 struct PointTree::Impl {
@@ -38,8 +48,9 @@ struct PointTree::Impl {
     float spacing = 0.0f;
     Box3f bounds;
 
-    std::vector<TreeNode> nodes;     // root first, level by level
-    std::vector<float> node_powers;  // (nodes, 3 groups): Σ E A
+    std::vector<TreeNode> nodes;       // root first, level by level
+    std::vector<NodeMoments> moments;  // of each node
+    std::vector<float> node_powers;    // (nodes, 3 groups): Σ E A
     // Points in Morton order.
     std::vector<V3f> positions, normals;
     std::vector<float> areas;

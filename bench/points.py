@@ -1,0 +1,216 @@
+"""Poisson points against the samplers that geometry people use today, on one mesh, in one run.
+
+    python bench/points.py MESH --counts 100000 1000000 -o bench/results/points
+
+Makes a virtual environment for the peers (pymeshlab, libigl, Open3D, trimesh) unless --peers-python names one. Every
+sampler runs in a process of its own, so that its time and peak memory are its own. Gaps, nearest pairs and the pair
+correlation are measured alike for all, by scipy. Writes a table (.md), all numbers (.json) and a plot (.png).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+PEERS = ("pymeshlab", "libigl", "open3d", "trimesh")
+
+# Each runs as `python -c SCRIPT mesh count spacing output threads`: load, then time the sampler alone.
+COMMON = """
+import sys, time, json, resource, numpy as np
+path, count, spacing, output, threads = sys.argv[1], int(sys.argv[2]), float(sys.argv[3]), sys.argv[4], int(sys.argv[5])
+data = np.load(path)
+V, F = data['V'], data['F']
+"""
+FINISH = """
+seconds = time.perf_counter() - start
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+np.savez(output, P=np.asarray(P, np.float64), seconds=seconds, base=base, peak=peak, **extra)
+"""
+BASE = "base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024; extra = {}; start = time.perf_counter()\n"
+SCRIPTS = {
+    "frazil": COMMON
+    + "import frazil as fz\nmesh = fz.Mesh(V.astype(np.float32), F.astype(np.int32))\n"
+    + BASE
+    + "points = fz.poisson_points(mesh, spacing, threads=threads)\nP = points.positions; extra['A'] = points.areas\n"
+    + FINISH,
+    "frazil, strict": COMMON
+    + "import frazil as fz\nmesh = fz.Mesh(V.astype(np.float32), F.astype(np.int32))\n"
+    + BASE
+    + "points = fz.poisson_points(mesh, spacing, thin_walls=False, threads=threads)\n"
+    + "P = points.positions; extra['A'] = points.areas\n"
+    + FINISH,
+    "pymeshlab": COMMON
+    + "import pymeshlab\nms = pymeshlab.MeshSet(); ms.add_mesh(pymeshlab.Mesh(V, F))\n"
+    + BASE
+    + "ms.generate_sampling_poisson_disk(samplenum=count)\nP = ms.current_mesh().vertex_matrix()\n"
+    + FINISH,
+    "libigl": COMMON
+    + "import igl\n"
+    + BASE
+    + "B, I, P = igl.blue_noise(V, F.astype(np.int64), spacing)[:3]\n"
+    + FINISH,
+    "open3d": COMMON
+    + "import open3d as o3d\n"
+    + "m = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(V), o3d.utility.Vector3iVector(F))\n"
+    + BASE
+    + "P = np.asarray(m.sample_points_poisson_disk(count).points)\n"
+    + FINISH,
+    "trimesh": COMMON
+    + "import trimesh\nm = trimesh.Trimesh(V, F, process=False)\n"
+    + BASE
+    + "P = trimesh.sample.sample_surface_even(m, count)[0]\n"
+    + FINISH,
+}
+
+
+def run(python: str, name: str, mesh: Path, count: int, spacing: float, threads: int, folder: Path, limit: float):
+    """One sampler in one process; its arrays, or the reason why there are none."""
+    output = folder / "out.npz"
+    output.unlink(missing_ok=True)
+    command = [python, "-c", SCRIPTS[name], str(mesh), str(count), str(spacing), str(output), str(threads)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
+    except subprocess.TimeoutExpired:
+        return f"more than {limit:.0f} s"
+    if not output.exists():
+        return (done.stderr.strip().splitlines() or [f"exit {done.returncode}"])[-1][:120]
+    return dict(np.load(output))
+
+
+def measure(points: np.ndarray, places: np.ndarray) -> dict:
+    """Nearest pair, largest gap over places on the surface (both through the air), spread, pair correlation."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(points)
+    nearest = tree.query(points, k=2)[0][:, 1]
+    gap = tree.query(places)[0].max()
+    scale = np.median(nearest)
+    some = np.random.default_rng(0).choice(len(points), min(len(points), 4000), replace=False)
+    edges = np.linspace(0, 4 * scale, 81)
+    near = tree.query_ball_point(points[some], edges[-1])
+    distances = np.concatenate([np.linalg.norm(points[n] - points[i], axis=1) for i, n in zip(some, near, strict=True)])
+    counts = np.histogram(distances[distances > 0], edges)[0]
+    ring = np.pi * (edges[1:] ** 2 - edges[:-1] ** 2)
+    correlation = counts / ring / len(some)
+    return {
+        "min": float(nearest.min()),
+        "gap": float(gap),
+        "gap_over_min": float(gap / nearest.min()) if nearest.min() > 0 else None,
+        "spread": float(nearest.std() / nearest.mean()),
+        "correlation": (correlation / correlation[-20:].mean()).tolist(),
+        "radius_over_median": (0.5 * (edges[1:] + edges[:-1]) / scale).tolist(),
+    }
+
+
+def sample(vertices, faces, count):
+    corners = vertices[faces]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    random = np.random.default_rng(7)
+    chosen = random.choice(len(faces), count, p=area / area.sum())
+    u, v = random.random((2, count))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    c = corners[chosen]
+    return c[:, 0] * (1 - u - v)[:, None] + c[:, 1] * u[:, None] + c[:, 2] * v[:, None], area.sum()
+
+
+def peers_python(folder: Path) -> str:
+    """A virtual environment with the peers, made once."""
+    python = folder / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy", *PEERS], check=True)
+    return str(python)
+
+
+def write(rows: list[dict], output: Path, mesh: Path, area: float) -> None:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.with_suffix(".json").write_text(json.dumps({"mesh": mesh.name, "area": area, "rows": rows}, indent=1))
+    lines = [
+        f"`{mesh.name}`; times of the sampler alone, without loading; gap and nearest pair through the air.",
+        "",
+        "| sampler | asked | points | s | points/s | x slower | gap / nearest pair | distance spread | bytes/point |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        if "error" in row:
+            lines.append(f"| {row['sampler']} | {row['asked']} | - | - | {row['error']} | | | | |")
+            continue
+        gap = f"{row['gap_over_min']:.2f}" if row["gap_over_min"] else "-"
+        lines.append(
+            f"| {row['sampler']} | {row['asked']:,} | {row['points']:,} | {row['seconds']:.2f} | {row['rate']:,.0f} "
+            f"| {row['slower']:.1f} | {gap} | {row['spread']:.3f} | {row['bytes']:,.0f} |"
+        )
+    output.with_suffix(".md").write_text("\n".join(lines) + "\n")
+    print("\n".join(lines))
+    try:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        import matplotlib.pyplot as plt
+    except ImportError:
+        print("matplotlib is not installed: no plot")
+        return
+    figure, axis = plt.subplots(figsize=(7, 4))
+    least = min(row["asked"] for row in rows)
+    for row in rows:
+        if "correlation" in row and row["asked"] == least:
+            axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"])
+    axis.set(
+        xlabel="distance / median nearest distance", ylabel="pair correlation", title=f"{mesh.name}, {least:,} points"
+    )
+    axis.legend()
+    figure.savefig(output.with_suffix(".png"), dpi=120, bbox_inches="tight")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("mesh", type=Path)
+    parser.add_argument("--counts", type=int, nargs="+", default=[100_000, 1_000_000])
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--limit", type=float, default=600.0, help="seconds a sampler may take")
+    parser.add_argument("--peers-python", help="a Python that has the peers; otherwise one is made in build/peers")
+    parser.add_argument("--only", nargs="+", choices=list(SCRIPTS), default=list(SCRIPTS))
+    parser.add_argument("-o", "--output", type=Path, default=Path("bench/results/points"))
+    options = parser.parse_args()
+
+    from frazil.mesh_io import read_mesh
+
+    mesh = read_mesh(options.mesh)
+    vertices, faces = mesh.positions.astype(np.float64), mesh.triangles.copy()
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        np.savez(folder / "mesh.npz", V=vertices, F=faces)
+        peers = options.peers_python or peers_python(Path("build/peers"))
+        for count in options.counts:
+            places, area = sample(vertices, faces, max(500_000, 2 * count))
+            spacing = float(np.sqrt(0.71 * area / count))
+            reference = None
+            for name in options.only:
+                python = sys.executable if name.startswith("frazil") else peers
+                got = run(python, name, folder / "mesh.npz", count, spacing, options.threads, folder, options.limit)
+                row = {"sampler": name, "asked": count}
+                if isinstance(got, str):
+                    rows.append(row | {"error": got})
+                    print(name, count, got, flush=True)
+                    continue
+                number, seconds = len(got["P"]), float(got["seconds"])
+                rate = number / seconds
+                reference = reference or rate
+                row |= {"points": number, "seconds": seconds, "rate": rate, "slower": reference / rate}
+                row |= {"bytes": float(got["peak"] - got["base"]) / number} | measure(got["P"], places)
+                if "A" in got:
+                    row["area_error"] = float(abs(got["A"].sum(dtype="f8") / area - 1))
+                rows.append(row)
+                print(f"{name} {count}: {rate:,.0f} points/s", flush=True)
+    write(rows, options.output, options.mesh, area)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,889 @@
+from collections.abc import Callable, Sequence
+from typing import Annotated
+
+import numpy
+from numpy.typing import NDArray
+
+
+class Cancelled(KeyboardInterrupt):
+    pass
+
+class Mesh:
+    """
+    A triangle mesh.
+
+    Parameters
+    ----------
+    positions : (V, 3) float32, metres, finite.
+    triangles : (F, 3) int32, counter-clockwise seen from outside.
+    normals : (V, 3) or (3F, 3) float32, unit length, optional; without them the mesh is faceted.
+    uvs : (V, 2) or (3F, 2) float32, optional.
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, NaN or infinite positions, indices out of range.
+
+    The arrays are copied; the properties are views of the mesh's own memory.
+    """
+
+    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None) -> None: ...
+
+    @property
+    def positions(self) -> NDArray[numpy.float32]: ...
+
+    @property
+    def triangles(self) -> NDArray[numpy.int32]: ...
+
+    def set_normals(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+        """
+        Give normals; interpolation is constant, uniform (per triangle), vertex or corner, found from the length
+        where it is not given.
+        """
+
+    def set_uvs(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+        """Give texture coordinates; see set_normals."""
+
+    def set_colors(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+        """Give display colours, linear RGB; see set_normals."""
+
+    @property
+    def normals(self) -> numpy.ndarray | None:
+        """View of the normals, or None."""
+
+    @property
+    def uvs(self) -> numpy.ndarray | None:
+        """View of the texture coordinates, or None."""
+
+    @property
+    def colors(self) -> numpy.ndarray | None:
+        """View of the display colours, or None."""
+
+    @property
+    def normals_interpolation(self) -> str: ...
+
+    @property
+    def uvs_interpolation(self) -> str: ...
+
+    @property
+    def colors_interpolation(self) -> str: ...
+
+    def submesh(self, triangles: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)]) -> Mesh:
+        """
+        Some of the triangles, by their indices (N,) int32, with the vertices that they use.
+        """
+
+    def transformed(self, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)]) -> Mesh:
+        """
+        Moved by a (4, 4) float64 matrix for row vectors; a mirroring one also flips the winding.
+        """
+
+    @property
+    def area(self) -> float:
+        """Surface area in square metres."""
+
+    def __repr__(self) -> str: ...
+
+class ControlMesh:
+    """
+    Polygons as USD gives them, right-handed.
+
+    Parameters
+    ----------
+    points : (V, 3) float32, metres.
+    face_vertex_counts, face_vertex_indices, hole_indices : int32.
+    crease_indices, crease_lengths, crease_sharpnesses, corner_indices, corner_sharpnesses : as in USD.
+    normals, uvs, colors : (array, interpolation) with 'constant', 'uniform', 'vertex' or 'corner'.
+    is_boundary_smooth : interpolateBoundary is edgeOnly.
+    """
+
+    def __init__(self, points: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], face_vertex_counts: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], face_vertex_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], *, hole_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_lengths: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_sharpnesses: Sequence[float] = [], corner_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, corner_sharpnesses: Sequence[float] = [], normals: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, uvs: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, colors: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, is_boundary_smooth: bool = False) -> None: ...
+
+def triangulate(cage: ControlMesh, path: str = 'ControlMesh') -> tuple[Mesh, NDArray[numpy.int32]]:
+    """
+    Flat polygons as triangles: (Mesh, the face of each triangle (F,) int32). ValueError, beginning with `path`,
+    for indices or primvars that do not fit together.
+    """
+
+def subdivide(cage: ControlMesh, level: int, path: str = 'ControlMesh') -> tuple[Mesh, NDArray[numpy.int32]]:
+    """
+    The Catmull-Clark limit surface, `level` quads along each edge: (Mesh, the face of each triangle).
+    """
+
+class PointSet:
+    """
+    Points on a mesh that stand for its surface. The arrays are views of the set's own memory.
+    """
+
+    @property
+    def positions(self) -> NDArray[numpy.float32]:
+        """(N, 3) float32, metres."""
+
+    @property
+    def normals(self) -> NDArray[numpy.float32]:
+        """(N, 3) float32: the triangles' geometric normals, unit length."""
+
+    @property
+    def areas(self) -> NDArray[numpy.float32]:
+        """
+        (N,) float32, m²: the surface nearest to each point on its side; their sum is the mesh's area.
+        """
+
+    @property
+    def triangles(self) -> NDArray[numpy.int32]:
+        """(N,) int32: the triangle that each point lies on."""
+
+    @property
+    def barycentrics(self) -> NDArray[numpy.float32]:
+        """
+        (N, 2) float32 in [0, 1]: the weights of the triangle's second and third corner.
+        """
+
+    @property
+    def spacing(self) -> float:
+        """The distance asked for, metres; the largest where it varies."""
+
+    def save(self, path: object) -> None:
+        """
+        Write a binary PLY file with all arrays. OSError where it cannot be written.
+        """
+
+    @staticmethod
+    def load(path: object) -> PointSet:
+        """Read a file that save() wrote. OSError where it cannot be read."""
+
+    def __len__(self) -> int: ...
+
+    def __repr__(self) -> str: ...
+
+def poisson_points(mesh: Mesh, spacing: float, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet:
+    """
+    Poisson-disk points on any mesh: never nearer than spacing, no surface farther than it from a point.
+
+    Parameters
+    ----------
+    mesh : Mesh, any triangle soup with some area.
+    spacing : float > 0, metres.
+    seed : int; the result depends on (mesh, spacing, seed) alone.
+    thin_walls : bool; True gives each side of a thin sheet its own points, False forbids any two points nearer
+        than spacing.
+    max_points : int; refuse to make more. 0 allows what fits into free memory.
+    threads : int; 0 takes all cores.
+    progress : callable (stage, fraction), optional.
+
+    Returns
+    -------
+    PointSet, about 0.7 area / spacing² points.
+
+    Raises
+    ------
+    ValueError
+        For spacing that is not > 0 or would make too many points, or a mesh without area.
+    """
+
+def tessellated_points(mesh: Mesh, edge_length: float) -> PointSet:
+    """
+    The centres of a regular cut of every triangle into parts with edges of at most edge_length (metres), with
+    their areas. ValueError where edge_length is not > 0 or would make too many points.
+    """
+
+def fresnel_dielectric(cos_theta: float, eta: float) -> float:
+    """
+    Reflected fraction of unpolarised light; eta = index it would enter / index it is in.
+    """
+
+def fresnel_average(eta: float) -> float:
+    """2 ∫ F(cos) cos dcos: what comes from all around."""
+
+class Medium:
+    """
+    What a translucent body is made of.
+
+    Parameters
+    ----------
+    sigma_s_prime : (3,) or number, 1/m, >= 0. Reduced scattering coefficient.
+    sigma_a : (3,) or number, 1/m, >= 0. Absorption coefficient.
+    eta : index of refraction relative to the outside, 1 to 4; ice is 1.31.
+
+    Raises
+    ------
+    ValueError
+        For coefficients that are negative, NaN, or both zero.
+    """
+
+    def __init__(self, sigma_s_prime: object, sigma_a: object, eta: float = 1.309999942779541) -> None: ...
+
+    @staticmethod
+    def from_albedo(albedo: object, mean_free_path: object, eta: float = 1.309999942779541) -> Medium:
+        """
+        The medium whose dipole has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path
+        `mean_free_path` = 1/(sigma_s_prime + sigma_a), in metres.
+        """
+
+    @property
+    def sigma_s_prime(self) -> object: ...
+
+    @property
+    def sigma_a(self) -> object: ...
+
+    @property
+    def eta(self) -> float: ...
+
+    @property
+    def mean_free_path(self) -> object:
+        """1/(sigma_s_prime + sigma_a), (3,), metres."""
+
+    def __repr__(self) -> str: ...
+
+class Dipole:
+    """The standard dipole of Jensen et al. 2001."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+class Ramp:
+    """
+    A colour for every distance between where light enters and where it leaves.
+
+    Parameters
+    ----------
+    distances : (K,) >= 0, increasing, metres; or mean free paths where mean_free_path is given.
+    colors : (K, 3) >= 0, factors; linear between knots, constant outside.
+    preserve_energy : scale each channel so that the total diffuse reflectance stays.
+    mean_free_path : metres that one unit of distance stands for.
+    """
+
+    def __init__(self, distances: object, colors: object, preserve_energy: bool = False, mean_free_path: float = 1.0) -> None: ...
+
+    def eval(self, r: object) -> object:
+        """
+        The factors at distances r (n,) in metres, (n, 3); preserve_energy is not in them.
+        """
+
+class Gathered:
+    """What a gather returns."""
+
+    @property
+    def exitance(self) -> NDArray[numpy.float32]: ...
+
+    @property
+    def coverage(self) -> NDArray[numpy.float32]: ...
+
+class PointTree:
+    """
+    The octree of points with their irradiance.
+
+    Parameters
+    ----------
+    points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).
+    irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.
+    profile : Dipole.
+    ramp : Ramp, optional.
+
+    Safe to gather from by many threads at once.
+    """
+
+    def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None) -> None: ...
+
+    def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free') -> Gathered:
+        """
+        Exitance and coverage at M positions (M, 3), in any order.
+
+        Returns an object with exitance (M, G, 3) and coverage (M, 3).
+        """
+
+    def gather_exact(self, positions: object, estimator: str = 'noise_free') -> Gathered:
+        """The same over every point in double precision: slow, to compare with."""
+
+    @property
+    def point_count(self) -> int: ...
+
+    @property
+    def node_count(self) -> int: ...
+
+    @property
+    def dropped_count(self) -> int:
+        """Points left out for their non-finite irradiance."""
+
+def area_compensation(coverage: object, profile: object, mode: str = 'ratio', limit: float = 8.0, strength: float = 1.0, by_luminance: bool = False) -> object:
+    """
+    Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to add
+    per unit of irradiance at the shading point.
+    """
+
+class Texture:
+    """
+    An image on a surface.
+
+    Parameters
+    ----------
+    texels : (height, width, channels) float32, linear, 1 to 4 channels, row 0 on top. Copied.
+    wrap_s, wrap_t : 'repeat', 'clamp', 'mirror' or 'black'.
+    """
+
+    def __init__(self, texels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrap_s: str = 'repeat', wrap_t: str = 'repeat') -> None: ...
+
+    @property
+    def texels(self) -> NDArray[numpy.float32]: ...
+
+    @property
+    def wrap_s(self) -> str: ...
+
+    @property
+    def wrap_t(self) -> str: ...
+
+    def __repr__(self) -> str: ...
+
+class TextureLookup:
+    """
+    How a material input reads a texture: texel * scale + bias, at
+    st' = rotate(st * st_scale, st_rotation degrees) + st_translation.
+
+    Parameters
+    ----------
+    texture : Texture, shared, not copied.
+    first_channel : 0..3; a scalar input reads this channel, a colour three from it on.
+    """
+
+    def __init__(self, texture: Texture, first_channel: int = 0, scale: Sequence[float] = [1.0, 1.0, 1.0], bias: Sequence[float] = [0.0, 0.0, 0.0], st_scale: Sequence[float] = [1.0, 1.0], st_rotation: float = 0.0, st_translation: Sequence[float] = [0.0, 0.0]) -> None: ...
+
+    @property
+    def texture(self) -> Texture: ...
+
+    @property
+    def first_channel(self) -> int: ...
+
+    @property
+    def scale(self) -> list[float]: ...
+
+    @property
+    def bias(self) -> list[float]: ...
+
+    @property
+    def st_scale(self) -> list[float]: ...
+
+    @property
+    def st_translation(self) -> list[float]: ...
+
+    @property
+    def st_rotation(self) -> float: ...
+
+    def __repr__(self) -> str: ...
+
+class StandardMaterial:
+    """
+    UsdPreviewSurface. Inputs take a constant or a TextureLookup; the names and
+    defaults are the specification's, in snake_case.
+    """
+
+    def __init__(self, *, diffuse_color: TextureLookup | Sequence[float] = ..., uses_display_color: bool = False, emissive_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], use_specular_workflow: bool = False, specular_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], metallic: TextureLookup | float = 0.0, roughness: TextureLookup | float = 0.5, clearcoat: TextureLookup | float = 0.0, clearcoat_roughness: TextureLookup | float = 0.009999999776482582, opacity: TextureLookup | float = 1.0, opacity_threshold: float = 0.0, ior: float = 1.5, normal: TextureLookup | None = None) -> None: ...
+
+    @property
+    def diffuse_color(self) -> TextureLookup | list[float]: ...
+
+    @diffuse_color.setter
+    def diffuse_color(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def emissive_color(self) -> TextureLookup | list[float]: ...
+
+    @emissive_color.setter
+    def emissive_color(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def specular_color(self) -> TextureLookup | list[float]: ...
+
+    @specular_color.setter
+    def specular_color(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def metallic(self) -> TextureLookup | float: ...
+
+    @metallic.setter
+    def metallic(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def roughness(self) -> TextureLookup | float: ...
+
+    @roughness.setter
+    def roughness(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def clearcoat(self) -> TextureLookup | float: ...
+
+    @clearcoat.setter
+    def clearcoat(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def clearcoat_roughness(self) -> TextureLookup | float: ...
+
+    @clearcoat_roughness.setter
+    def clearcoat_roughness(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def opacity(self) -> TextureLookup | float: ...
+
+    @opacity.setter
+    def opacity(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def uses_display_color(self) -> bool: ...
+
+    @uses_display_color.setter
+    def uses_display_color(self, arg: bool, /) -> None: ...
+
+    @property
+    def use_specular_workflow(self) -> bool: ...
+
+    @use_specular_workflow.setter
+    def use_specular_workflow(self, arg: bool, /) -> None: ...
+
+    @property
+    def opacity_threshold(self) -> float: ...
+
+    @opacity_threshold.setter
+    def opacity_threshold(self, arg: float, /) -> None: ...
+
+    @property
+    def ior(self) -> float: ...
+
+    @ior.setter
+    def ior(self, arg: float, /) -> None: ...
+
+    @property
+    def normal(self) -> TextureLookup | None: ...
+
+    def __repr__(self) -> str: ...
+
+class IceMaterial:
+    """
+    frazil:ice: a translucent core under a glossy dielectric boundary.
+
+    Parameters
+    ----------
+    medium : Medium, in 1/m.
+    roughness : float in [0, 1], or a TextureLookup.
+    specular, translucency : weights in [0, 1] of the reflection and of the core.
+    tint : RGB factor on what leaves the core, or a TextureLookup.
+    ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.
+    ramp_preserve_energy : keep the total reflectance whatever the ramp.
+    compensation : 'off', 'ratio', 'conserve', 'fill' or 'linear'; compensation_limit >= 1;
+        compensation_strength in [0, 1].
+    spacing : of the points, metres; 0 = from the mean free path.
+
+    Ranges are checked when the scene is rendered.
+    """
+
+    def __init__(self, medium: Medium, *, roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'ratio', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
+
+    @property
+    def roughness(self) -> TextureLookup | float: ...
+
+    @roughness.setter
+    def roughness(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def tint(self) -> TextureLookup | list[float]: ...
+
+    @tint.setter
+    def tint(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def medium(self) -> Medium: ...
+
+    @medium.setter
+    def medium(self, arg: Medium, /) -> None: ...
+
+    @property
+    def specular(self) -> float: ...
+
+    @specular.setter
+    def specular(self, arg: float, /) -> None: ...
+
+    @property
+    def translucency(self) -> float: ...
+
+    @translucency.setter
+    def translucency(self, arg: float, /) -> None: ...
+
+    @property
+    def spacing(self) -> float: ...
+
+    @spacing.setter
+    def spacing(self, arg: float, /) -> None: ...
+
+    @property
+    def ramp_distances(self) -> list[float]: ...
+
+    @property
+    def ramp_colors(self) -> list[list[float]]: ...
+
+    @property
+    def ramp_preserve_energy(self) -> bool: ...
+
+    @property
+    def compensation(self) -> str: ...
+
+    @compensation.setter
+    def compensation(self, arg: str, /) -> None: ...
+
+    @property
+    def compensation_limit(self) -> float: ...
+
+    @compensation_limit.setter
+    def compensation_limit(self, arg: float, /) -> None: ...
+
+    @property
+    def compensation_strength(self) -> float: ...
+
+    @compensation_strength.setter
+    def compensation_strength(self, arg: float, /) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+class DomeLight:
+    """
+    Light from all around.
+
+    Parameters
+    ----------
+    image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a
+        uniform dome. Copied.
+    """
+
+    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight') -> None: ...
+
+    @property
+    def has_image(self) -> bool: ...
+
+    def radiance(self, direction: Sequence[float]) -> list[float]:
+        """
+        Radiance from a unit direction in the light's own frame; 1 without an image.
+        """
+
+class DistantLight:
+    """A sun along -z; `angle` is its full angle in degrees."""
+
+    def __init__(self, angle: float = 0.5299999713897705) -> None: ...
+
+    @property
+    def angle(self) -> float: ...
+
+    @angle.setter
+    def angle(self, arg: float, /) -> None: ...
+
+class RectLight:
+    """A rectangle in x and y that shines along -z, in the light's units."""
+
+    def __init__(self, width: float = 1.0, height: float = 1.0) -> None: ...
+
+    @property
+    def width(self) -> float: ...
+
+    @width.setter
+    def width(self, arg: float, /) -> None: ...
+
+    @property
+    def height(self) -> float: ...
+
+    @height.setter
+    def height(self, arg: float, /) -> None: ...
+
+class DiskLight:
+    """A disk in x and y that shines along -z, in the light's units."""
+
+    def __init__(self, radius: float = 0.5) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class SphereLight:
+    """A sphere that shines outwards, in the light's units."""
+
+    def __init__(self, radius: float = 0.5) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class CylinderLight:
+    """
+    A tube about x without caps that shines outwards, in the light's units.
+    """
+
+    def __init__(self, length: float = 1.0, radius: float = 0.5) -> None: ...
+
+    @property
+    def length(self) -> float: ...
+
+    @length.setter
+    def length(self, arg: float, /) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class Light:
+    """
+    A light of the scene.
+
+    Parameters
+    ----------
+    shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.
+    radiance : RGB, the product of intensity, exposure, colour and colour temperature.
+    matrix : (4, 4) float64 light to world, for row vectors; None = identity.
+    path : name for messages. group : light group, '' = the default one.
+    normalize : divide by the light's area in square metres.
+    diffuse, specular, translucency : multipliers of what the light does to each component.
+    """
+
+    def __init__(self, shape: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, *, radiance: Sequence[float] = [1.0, 1.0, 1.0], matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, path: str = 'Light', group: str = '', normalize: bool = False, diffuse: float = 1.0, specular: float = 1.0, translucency: float = 1.0) -> None: ...
+
+    @property
+    def path(self) -> str: ...
+
+    @path.setter
+    def path(self, arg: str, /) -> None: ...
+
+    @property
+    def group(self) -> str: ...
+
+    @group.setter
+    def group(self, arg: str, /) -> None: ...
+
+    @property
+    def shape(self) -> DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight: ...
+
+    @shape.setter
+    def shape(self, arg: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, /) -> None: ...
+
+    @property
+    def radiance(self) -> list[float]: ...
+
+    @radiance.setter
+    def radiance(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def normalize(self) -> bool: ...
+
+    @normalize.setter
+    def normalize(self, arg: bool, /) -> None: ...
+
+    @property
+    def matrix(self) -> object: ...
+
+    @matrix.setter
+    def matrix(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)], /) -> None: ...
+
+    @property
+    def diffuse(self) -> float: ...
+
+    @property
+    def specular(self) -> float: ...
+
+    @property
+    def translucency(self) -> float: ...
+
+    def __repr__(self) -> str: ...
+
+class Camera:
+    """
+    A camera that looks along -z of its frame, +y up.
+
+    Parameters
+    ----------
+    matrix : (4, 4) float64 camera to world, for row vectors, metres; None = identity.
+    focal_length, horizontal_aperture, vertical_aperture, horizontal_offset, vertical_offset :
+        in one unit; only ratios count.
+    is_orthographic, aperture_scale : metres per unit of aperture where it is orthographic.
+    clipping : (near, far), metres.
+    """
+
+    def __init__(self, *, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, focal_length: float = 50.0, horizontal_aperture: float = 20.954999923706055, vertical_aperture: float = 15.290800094604492, horizontal_offset: float = 0.0, vertical_offset: float = 0.0, is_orthographic: bool = False, aperture_scale: float = 1.0, clipping: Sequence[float] = [9.999999747378752e-05, 999999995904.0], path: str = 'Camera') -> None: ...
+
+    @property
+    def path(self) -> str: ...
+
+    @path.setter
+    def path(self, arg: str, /) -> None: ...
+
+    @property
+    def matrix(self) -> object: ...
+
+    @matrix.setter
+    def matrix(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)], /) -> None: ...
+
+    @property
+    def is_orthographic(self) -> bool: ...
+
+    @is_orthographic.setter
+    def is_orthographic(self, arg: bool, /) -> None: ...
+
+    @property
+    def focal_length(self) -> float: ...
+
+    @focal_length.setter
+    def focal_length(self, arg: float, /) -> None: ...
+
+    @property
+    def horizontal_aperture(self) -> float: ...
+
+    @horizontal_aperture.setter
+    def horizontal_aperture(self, arg: float, /) -> None: ...
+
+    @property
+    def vertical_aperture(self) -> float: ...
+
+    @vertical_aperture.setter
+    def vertical_aperture(self, arg: float, /) -> None: ...
+
+    @property
+    def horizontal_offset(self) -> float: ...
+
+    @horizontal_offset.setter
+    def horizontal_offset(self, arg: float, /) -> None: ...
+
+    @property
+    def vertical_offset(self) -> float: ...
+
+    @vertical_offset.setter
+    def vertical_offset(self, arg: float, /) -> None: ...
+
+    @property
+    def aperture_scale(self) -> float: ...
+
+    @aperture_scale.setter
+    def aperture_scale(self, arg: float, /) -> None: ...
+
+    @property
+    def clipping(self) -> list[float]: ...
+
+    @clipping.setter
+    def clipping(self, arg: Sequence[float], /) -> None: ...
+
+    def __repr__(self) -> str: ...
+
+class Material:
+    """A named model of the scene."""
+
+    @property
+    def path(self) -> str: ...
+
+    @property
+    def model(self) -> StandardMaterial | IceMaterial: ...
+
+    def __repr__(self) -> str: ...
+
+class Object:
+    """A mesh with a material, placed in the world."""
+
+    @property
+    def path(self) -> str: ...
+
+    @property
+    def mesh(self) -> int: ...
+
+    @property
+    def material(self) -> int: ...
+
+    @property
+    def matrix(self) -> object: ...
+
+    def __repr__(self) -> str: ...
+
+class Scene:
+    """
+    All that is rendered, as plain data: one frame, metres, +y up.
+
+    Meshes and materials are added once and placed by index; lists are views of the scene's parts.
+    """
+
+    def __init__(self) -> None: ...
+
+    def add_mesh(self, mesh: Mesh, path: str) -> int:
+        """
+        Add a mesh (copied); its index. ValueError, beginning with `path`, if it is broken.
+        """
+
+    def add_material(self, path: str, model: StandardMaterial | IceMaterial) -> int:
+        """Add a StandardMaterial or IceMaterial (copied); its index."""
+
+    def add_object(self, path: str, mesh: int, material: int, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None) -> int:
+        """
+        Place a mesh by a (4, 4) float64 matrix for row vectors, None = identity; the object's index.
+        """
+
+    def add_light(self, light: Light) -> int:
+        """Add a light (copied); its index."""
+
+    @property
+    def camera(self) -> Camera: ...
+
+    @camera.setter
+    def camera(self, arg: Camera, /) -> None: ...
+
+    @property
+    def meshes(self) -> list[Mesh]:
+        """Copies of the meshes, in the order of their indices."""
+
+    def mesh(self, index: int) -> Mesh:
+        """A copy of one mesh."""
+
+    @property
+    def mesh_paths(self) -> list[str]: ...
+
+    @property
+    def materials(self) -> list[Material]: ...
+
+    @property
+    def objects(self) -> list[Object]: ...
+
+    @property
+    def lights(self) -> list[Light]: ...
+
+    def __repr__(self) -> str: ...
+
+class RenderResult:
+    """What a render gives: layers and statistics."""
+
+    @property
+    def layers(self) -> dict:
+        """
+        dict of AOV or layer name to (height, width, channels) float32; views of the film's own memory.
+        """
+
+    @property
+    def stats(self) -> dict:
+        """
+        dict: points, nodes, rays, gathers, dropped samples, seconds per stage.
+        """
+
+def aov_table() -> list:
+    """The AOV table: a list of dicts (name, channels, meaning, filter, ...)."""
+
+def render(scene: Scene, *, width: int = 960, height: int = 540, samples: int = 32, seed: int = 0, threads: int = 0, filter: str = 'blackman_harris', max_bounces: int = 4, spacing: float = 0.0, spacing_scale: float = 1.0, bake_samples: int = 64, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', progress: object | None = None) -> RenderResult:
+    """
+    Render a scene; see frazil.render. progress(stage, fraction) is called now and then from any thread;
+    an exception that it raises stops the render.
+    """

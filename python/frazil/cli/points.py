@@ -1,0 +1,97 @@
+"""The command `frazil points`: Poisson points of a mesh file, written as PLY or USD."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+USD_SUFFIXES = {".usd", ".usda", ".usdc"}
+
+
+def points_command(
+    mesh: Annotated[Path, typer.Argument(help="USD, OBJ, PLY, STL or glTF file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Binary PLY, or USD by its suffix.")],
+    spacing: Annotated[float | None, typer.Option(help="Distance between points, in the mesh's unit (USD: m).")] = None,
+    count: Annotated[int | None, typer.Option(help="Number of points, instead of a spacing.")] = None,
+    seed: Annotated[int, typer.Option(help="Another seed gives other points.", min=0, max=2**32 - 1)] = 0,
+    thin_walls: Annotated[bool, typer.Option(help="Give both sides of thin sheets their own points.")] = True,
+    tessellated: Annotated[
+        bool, typer.Option("--tessellated", help="Regular points instead, edges no longer than --spacing.")
+    ] = False,
+    frame: Annotated[float | None, typer.Option(help="Time code of a USD file.")] = None,
+    threads: Annotated[int, typer.Option(help="0 takes all cores.", min=0)] = 0,
+    stats: Annotated[bool, typer.Option("--stats", help="Measure the points and print the result.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No progress.")] = False,
+) -> None:
+    """Place Poisson-disk points on a mesh, with their areas."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    import frazil as fz
+    from frazil.mesh_io import read_mesh
+
+    if (spacing is None) == (count is None):
+        raise typer.BadParameter("give --spacing or --count, and not both")
+    if tessellated and spacing is None:
+        raise typer.BadParameter("--tessellated needs --spacing")
+    try:
+        surface = read_mesh(mesh, frame=frame)
+        with Progress(console=Console(stderr=True), transient=True, disable=quiet) as bar:
+            tasks = {}
+
+            def report(stage: str, fraction: float) -> None:
+                if stage not in tasks:
+                    tasks[stage] = bar.add_task(stage, total=1.0)
+                bar.update(tasks[stage], completed=fraction)
+
+            if tessellated:
+                points = fz.tessellated_points(surface, spacing)
+            else:
+                points = fz.poisson_points(
+                    surface, spacing, seed, count=count, thin_walls=thin_walls, threads=threads, progress=report
+                )
+        if output.suffix.lower() in USD_SUFFIXES:
+            save_usd(points, output)
+        else:
+            points.save(output)
+    except (ValueError, OSError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    typer.echo(f"{len(points)} points, spacing {points.spacing:.6g}, area {points.areas.sum(dtype='f8'):.6g}: {output}")
+    if stats:
+        measured = fz.point_statistics(points, surface, thin_walls=thin_walls)
+        typer.echo(f"nearest pair       {measured.min_distance / points.spacing:.6f} x spacing")
+        typer.echo(f"largest gap        {measured.gap / points.spacing:.6f} x spacing")
+        typer.echo(f"distance spread    {measured.distance_spread:.4f} of the mean")
+        typer.echo(f"area spread        {measured.area_spread:.4f} of the mean")
+
+
+def save_usd(points, path: Path) -> None:
+    """Write a UsdGeom.Points prim /Points in metres, with normals, widths and the rest as primvars."""
+    from pxr import Sdf, Usd, UsdGeom, Vt
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    prim = UsdGeom.Points.Define(stage, "/Points")
+    stage.SetDefaultPrim(prim.GetPrim())
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points.positions))
+    prim.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(points.normals))
+    prim.CreateWidthsAttr(Vt.FloatArray([points.spacing]))
+    prim.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+    if len(points):
+        prim.CreateExtentAttr(UsdGeom.Points.ComputeExtent(prim.GetPointsAttr().Get(), Vt.FloatArray([points.spacing])))
+    api = UsdGeom.PrimvarsAPI(prim)
+    vertex = UsdGeom.Tokens.vertex
+    types = Sdf.ValueTypeNames
+    for name, kind, values in (
+        ("frazil:area", types.FloatArray, Vt.FloatArray.FromNumpy(points.areas)),
+        ("frazil:triangle", types.IntArray, Vt.IntArray.FromNumpy(points.triangles)),
+        ("frazil:barycentrics", types.Float2Array, Vt.Vec2fArray.FromNumpy(points.barycentrics)),
+    ):
+        api.CreatePrimvar(name, kind, vertex).Set(values)
+    api.CreatePrimvar("frazil:spacing", types.Double, UsdGeom.Tokens.constant).Set(points.spacing)
+    if not stage.GetRootLayer().Export(str(path)):
+        raise OSError(f"{path}: file must be writable, got an error while writing. Check the folder and disk.")
