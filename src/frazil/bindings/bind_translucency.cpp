@@ -204,6 +204,10 @@ void bind_translucency(nb::module_& module) {
             },
             "distances"_a, "colors"_a, "preserve_energy"_a = false, "mean_free_path"_a = 1.0)
         .def(
+            "energy_scale",
+            [](const Ramp& self, nb::handle profile) { return to_array(energy_scale(self, to_profile(profile))); },
+            "profile"_a, "What preserve_energy multiplies each channel by, (3,); 1 where it is off.")
+        .def(
             "eval",
             [](const Ramp& self, nb::handle r) {
                 return map_radii(r, "Ramp: r", [&](float x) { return eval(self, x); });
@@ -215,6 +219,11 @@ void bind_translucency(nb::module_& module) {
                      [](Gathered& self) {
                          return view(reinterpret_cast<float*>(self.exitance.data()),
                                      {self.coverage.size(), self.groups, 3}, nb::find(self));
+                     })
+        .def_prop_ro("layers",
+                     [](Gathered& self) {
+                         return view(reinterpret_cast<float*>(self.layers.data()),
+                                     {self.coverage.size(), self.knots, self.groups, 3}, nb::find(self));
                      })
         .def_prop_ro("coverage", [](Gathered& self) {
             return view(reinterpret_cast<float*>(self.coverage.data()), {self.coverage.size(), 3}, nb::find(self));
@@ -241,15 +250,19 @@ void bind_translucency(nb::module_& module) {
             "points"_a, "irradiance"_a, "profile"_a, "ramp"_a = nb::none())
         .def(
             "gather",
-            [](const PointTree& self, nb::handle positions, float tolerance, const std::string& estimator) {
+            [](const PointTree& self, nb::handle positions, float tolerance, const std::string& estimator,
+               bool ramp_layers) {
                 const std::vector<V3f> where = to_vectors3(as_floats(positions), "PointTree: positions");
-                const GatherOptions options{tolerance, estimator_named(estimator)};
+                const GatherOptions options{tolerance, estimator_named(estimator), ramp_layers};
                 nb::gil_scoped_release release;
                 return self.gather(where.data(), where.size(), options);
             },
-            "positions"_a, "tolerance"_a = 0.01f, "estimator"_a = "noise_free",
+            "positions"_a, "tolerance"_a = 0.01f, "estimator"_a = "noise_free", "ramp_layers"_a = false,
             "Exitance and coverage at M positions (M, 3), in any order.\n\n"
-            "Returns an object with exitance (M, G, 3) and coverage (M, 3).")
+            "Returns an object with exitance (M, G, 3) and coverage (M, 3); with ramp_layers also layers (M, K, G, 3), "
+            "the\n"
+            "exitance per hat function of the ramp: colours times layers sum to the exitance (times "
+            "Ramp.energy_scale).")
         .def(
             "gather_exact",
             [](const PointTree& self, nb::handle positions, const std::string& estimator) {

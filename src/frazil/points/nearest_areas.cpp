@@ -16,7 +16,8 @@ constexpr double kLongestEdge = 3.0;  // of a fragment, in spacings: larger ones
 // Sums that do not depend on the order of their terms.
 class FixedPointSums {
   public:
-    FixedPointSums(std::size_t count, double total) : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
+    FixedPointSums(std::size_t count, double total)
+        : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
 
     void add(std::size_t index, double value) {
         std::atomic_ref<std::int64_t>(sums_[index])
@@ -128,8 +129,8 @@ class TileSharer {
 
     void push_candidate(const Fragment& f, std::uint32_t p) {
         const V3f& place = near_.locals[p];
-        candidates_.push_back({{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(),
-                                (f.corners[2] - place).length2()}});
+        candidates_.push_back(
+            {{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(), (f.corners[2] - place).length2()}});
         points_.push_back(p);
     }
 
@@ -148,8 +149,7 @@ class TileSharer {
 }  // namespace
 
 std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, double unit,
-                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts,
-                                 Progress* progress) {
+                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts, Progress* progress) {
     std::vector<std::size_t> first(grid.count() + 1, 0);
     for (std::size_t i = 0; i < grid.count(); ++i) first[i + 1] = first[i] + darts[i].size();
     FixedPointSums sums(first.back(), surface_area(mesh));
@@ -159,8 +159,7 @@ std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, 
     parallel_for(grid.count(), kTileGrain, [&](std::size_t begin, std::size_t end) {
         TileSharer& sharer = sharers.local();
         for (std::size_t tile = begin; tile < end; ++tile) {
-            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, darts, first,
-                         sums);
+            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, darts, first, sums);
         }
         if (progress) progress->update("areas", double(done += end - begin) / double(grid.count()));
     });

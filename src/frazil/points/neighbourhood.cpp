@@ -52,7 +52,8 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
     }
     // The distance from the point to a slab of cells; end cells reach outwards without end.
     const auto gap = [&](int cell, int axis) {
-        const float low = cell == 0 ? -1e30f : cell * width_, high = cell + 1 == int(cells_) ? 1e30f : (cell + 1) * width_;
+        const float low = cell == 0 ? -1e30f : cell * width_,
+                    high = cell + 1 == int(cells_) ? 1e30f : (cell + 1) * width_;
         return std::max(0.0f, std::max(low - local[axis], local[axis] - high));
     };
     const float reach2 = reach_ * reach_ * 1.0001f + 1e-6f;

@@ -46,9 +46,9 @@ class Neighbourhood {
                 const auto dz = hn::Sub(hn::Load(tag, list.z + lane), z);
                 const auto d2 = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
                 // In the order of is_same_side, so that both decide alike.
-                const auto dot = hn::Add(hn::Add(hn::Mul(hn::Load(tag, list.nx + lane), nx),
-                                                 hn::Mul(hn::Load(tag, list.ny + lane), ny)),
-                                         hn::Mul(hn::Load(tag, list.nz + lane), nz));
+                const auto dot = hn::Add(
+                    hn::Add(hn::Mul(hn::Load(tag, list.nx + lane), nx), hn::Mul(hn::Load(tag, list.ny + lane), ny)),
+                    hn::Mul(hn::Load(tag, list.nz + lane), nz));
                 std::uint8_t bytes[8] = {};
                 hn::StoreMaskBits(tag, hn::And(hn::Le(d2, limit), hn::Gt(dot, cosine)), bytes);
                 for (unsigned bits = bytes[0]; bits != 0; bits &= bits - 1) {

@@ -36,7 +36,11 @@ struct Cut {
     void add_powers(const float* powers, float scale) {
         const std::size_t row = 3 * tree.groups, old = list.powers.size();
         list.powers.resize(old + row);
-        for (std::size_t c = 0; c < row; ++c) list.powers[old + c] = powers[c] * scale;
+        Source& source = list.sources.back();
+        for (std::size_t c = 0; c < row; ++c) {
+            list.powers[old + c] = powers[c] * scale;
+            source.power[c % 3] += std::abs(powers[c] * scale);
+        }
     }
 
     void add_cluster(std::uint32_t index) {
@@ -62,7 +66,8 @@ struct Cut {
                                  -2.0f * v * n.x * n.y, -2.0f * v * n.x * n.z, -2.0f * v * n.y * n.z},
                                 2.0f * v,
                                 {0.0f, 0.0f, 0.0f},
-                                area});
+                                area,
+                                {0.0f, 0.0f, 0.0f}});
         add_powers(&tree.irradiance[p * tree.groups].x, area);
     }
 
@@ -120,17 +125,12 @@ std::size_t darkness_level(const PointTree::Impl& tree, const BlockSums& block) 
     float darkest = 1.0f;
     for (std::size_t c = 0; c < 3; ++c) {
         float mean = 0.0f;
-        std::array<float, kBlockLanes> total{};
-        for (std::size_t g = 0; g < tree.groups; ++g) {
-            mean += std::abs(tree.node_powers[3 * g + c]);
-            const float* exitance = &block.exitance[(3 * g + c) * kBlockLanes];
-            for (std::size_t lane = 0; lane < block.lanes; ++lane) total[lane] += std::abs(exitance[lane]);
-        }
+        for (std::size_t g = 0; g < tree.groups; ++g) mean += std::abs(tree.node_powers[3 * g + c]);
         if (!(mean > 0.0f)) continue;
         mean /= tree.moments[0].area;
         for (std::size_t lane = 0; lane < block.lanes; ++lane) {
-            const float expected = mean * block.coverage[c][lane];
-            if (total[lane] < darkest * expected) darkest = total[lane] / expected;
+            const float expected = mean * block.coverage[c][lane], arrives = std::abs(block.unshaded[c][lane]);
+            if (arrives < darkest * expected) darkest = arrives / expected;
         }
     }
     std::size_t level = 0;
@@ -164,6 +164,12 @@ std::vector<KeyedIndex> sorted_positions(const PointTree::Impl& tree, const V3f*
     return keys;
 }
 
+void copy_exitance(const BlockSums& block, std::size_t lane, std::size_t groups, Rgb* to) {
+    for (std::size_t g = 0; g < groups; ++g) {
+        for (std::size_t c = 0; c < 3; ++c) to[g][c] = block.exitance[(3 * g + c) * kBlockLanes + lane];
+    }
+}
+
 }  // namespace
 
 Gathered PointTree::gather(const V3f* positions, std::size_t count, const GatherOptions& options) const {
@@ -175,14 +181,22 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     out.groups = tree.groups;
     out.exitance.assign(count * tree.groups, Rgb(0.0f));
     out.coverage.assign(count, Rgb(0.0f));
+    if (options.ramp_layers && tree.ramp.is_empty()) {
+        throw ValueError("PointTree: ramp_layers must be off without a ramp, got on. Give the tree a ramp.");
+    }
+    if (options.ramp_layers) out.knots = tree.ramp.distances.size();
+    out.layers.assign(count * out.knots * tree.groups, Rgb(0.0f));
     if (count == 0) return out;
     const std::vector<KeyedIndex> order = sorted_positions(tree, positions, count);
     if (tree.nodes.empty()) return out;
 
     // One rule for lit places, and stricter ones for the darker.
     std::vector<OpeningRule> rules;
-    for (const double darkness : kDarkness) rules.emplace_back(tree.profile, tree.table, options.tolerance, darkness);
+    for (const double darkness : kDarkness)
+        rules.emplace_back(tree.profile, tree.table, !tree.ramp.is_empty(), options.tolerance, darkness);
     const RampHinges ramp = hinges_of(tree.ramp, tree.ramp_scale);
+    std::vector<RampHinges> hats;
+    for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(tree.ramp, k), Rgb(1.0f)));
     const float widest = kWidestBlock / std::sqrt(tree.table.inverse_z0_squared);
     parallel_for(order.size(), 8 * kBlockLanes, [&](std::size_t chunk_begin, std::size_t chunk_end) {
         Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free, {}, {}};
@@ -213,8 +227,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
             }
             // Gather by the rule of the block before; again where it proves too lax here.
             for (;;) {
-                for (auto& row : block.coverage) row.fill(0.0f);
-                block.exitance.assign(3 * tree.groups * kBlockLanes, 0.0f);
+                block.clear(tree.groups);
                 cut.rule = &rules[level];
                 cut.build(box);
                 add_sources(tree.table, ramp, cut.list, tree.groups, block);
@@ -225,11 +238,16 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
             }
             for (std::size_t lane = 0; lane < block.lanes; ++lane) {
                 const std::size_t to = order[begin + lane].index;
-                for (int c = 0; c < 3; ++c) {
-                    out.coverage[to][c] = block.coverage[c][lane];
-                    for (std::size_t g = 0; g < tree.groups; ++g) {
-                        out.exitance[to * tree.groups + g][c] = block.exitance[(3 * g + c) * kBlockLanes + lane];
-                    }
+                for (int c = 0; c < 3; ++c) out.coverage[to][c] = block.coverage[c][lane];
+                copy_exitance(block, lane, tree.groups, &out.exitance[to * tree.groups]);
+            }
+            // The same cut once more for every knot of the ramp.
+            for (std::size_t k = 0; k < hats.size(); ++k) {
+                block.clear(tree.groups);
+                add_sources(tree.table, hats[k], cut.list, tree.groups, block);
+                for (std::size_t lane = 0; lane < block.lanes; ++lane) {
+                    const std::size_t to = order[begin + lane].index;
+                    copy_exitance(block, lane, tree.groups, &out.layers[(to * out.knots + k) * tree.groups]);
                 }
             }
         }

@@ -29,7 +29,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
     std::vector<double> exitance(row);
     for (std::size_t lane = 0; lane < block.lanes; ++lane) {
         std::fill(exitance.begin(), exitance.end(), 0.0);
-        double coverage[3] = {0.0, 0.0, 0.0};
+        double coverage[3] = {0.0, 0.0, 0.0}, unshaded[3] = {0.0, 0.0, 0.0};
         for (std::size_t s = 0; s < list.sources.size(); ++s) {
             const Source& source = list.sources[s];
             const auto& cov = source.covariance;
@@ -49,6 +49,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;
                 float lit = even + f.slope * lean;
+                unshaded[c] += double(lit) * source.power[c];
                 if (!ramp.is_flat) {
                     // Average each hinge over a uniform spread of distances.
                     float color = ramp.first[c], slope = 0.0f;
@@ -66,7 +67,10 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                 }
             }
         }
-        for (int c = 0; c < 3; ++c) block.coverage[c][lane] += static_cast<float>(coverage[c]);
+        for (int c = 0; c < 3; ++c) {
+            block.coverage[c][lane] += static_cast<float>(coverage[c]);
+            block.unshaded[c][lane] += static_cast<float>(unshaded[c]);
+        }
         for (std::size_t c = 0; c < row; ++c) {
             block.exitance[c * kBlockLanes + lane] += static_cast<float>(exitance[c]);
         }

@@ -24,6 +24,7 @@ struct Source {
     float trace;                        // of the covariance
     std::array<float, 3> power_offset;  // twice the way from center to the centre of power
     float area;
+    std::array<float, 3> power;  // of all groups together, in magnitude
 };
 
 // Sources of one block with their power, (sources, 3 groups).
@@ -37,12 +38,19 @@ struct SourceList {
     }
 };
 
-// Shading points and their sums. Rows of kBlockLanes floats: coverage (3 rows), exitance (3 groups rows).
+// Shading points and their sums. Rows of kBlockLanes floats: exitance has 3 groups of them.
 struct BlockSums {
     alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
     std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
     alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
+    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // exitance of all groups, without ramp
     std::vector<float> exitance;
+
+    void clear(std::size_t groups) {
+        for (auto& row : coverage) row.fill(0.0f);
+        for (auto& row : unshaded) row.fill(0.0f);
+        exitance.assign(3 * groups * kBlockLanes, 0.0f);
+    }
 };
 
 // Piecewise-linear ramp as a sum of hinges: colour at 0 plus slope changes times max(0, r - distance).

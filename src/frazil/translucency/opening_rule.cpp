@@ -7,13 +7,14 @@ namespace {
 
 // Calibrated on a bunny and a sphere (bench/gather.py): how a tolerance becomes a size, and by how much the size may
 // grow where little of the profile's energy is left.
-constexpr double kSizePerTolerance = 500.0, kSharePower = 0.7, kLargestCubed = 7.0;
+constexpr double kSizePerTolerance = 500.0, kSharePower = 0.7, kLargestCubed = 7.0, kRampCaution = 0.4;
 // A cluster is never seen from nearer than its radius over this.
 constexpr double kWidest = 0.6;
 
 }  // namespace
 
-OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, float tolerance, double darkness)
+OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance,
+                         double darkness)
     : inverse_z0_squared_(table.inverse_z0_squared) {
     const double z0 = 1.0 / std::sqrt(double(inverse_z0_squared_));
     for (int i = 0; i < kEntries; ++i) {
@@ -26,7 +27,8 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, float
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
             const double bend = 1.5 / std::hypot(r, mean_free_path(profile, c)) + decay;
             const double share = std::min(1.0, 6.0 * (r * r + z0 * z0) * f / (total * darkness));
-            const double cubed = std::min(kLargestCubed, kSizePerTolerance * tolerance);
+            const double cubed =
+                std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
             limit = std::min(limit, std::cbrt(cubed / std::pow(std::max(share, 1e-12), kSharePower)) / bend);
         }
         largest_[i] = static_cast<float>(limit * limit);

@@ -25,12 +25,17 @@ enum class Estimator {
 struct GatherOptions {
     float tolerance = 0.01f;  // relative error of a gather that clustering may make; > 0
     Estimator estimator = Estimator::noise_free;
+    bool ramp_layers = false;  // keep S per knot of the ramp
 };
 
 struct Gathered {
     std::size_t groups = 1;
     std::vector<Rgb> exitance;  // S, (M, groups), without area compensation
     std::vector<Rgb> coverage;  // W, (M), without ramp
+    // With ramp_layers, (M, knots, groups): S per hat function of the ramp, without preserve_energy. The sum of knot
+    // colour times layer, times energy_scale, is the exitance that a ramp of these colours would give.
+    std::size_t knots = 0;
+    std::vector<Rgb> layers;
 };
 
 class PointTree {

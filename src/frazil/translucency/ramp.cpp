@@ -67,6 +67,12 @@ Rgb energy_scale(const Ramp& ramp, const Profile& profile) {
     return scale;
 }
 
+Ramp hat(const Ramp& ramp, std::size_t k) {
+    Ramp only{ramp.distances, std::vector<Rgb>(ramp.distances.size(), Rgb(0.0f)), false};
+    only.colors[k] = Rgb(1.0f);
+    return only;
+}
+
 Ramp in_metres(const Ramp& ramp, double mean_free_path) {
     Ramp scaled = ramp;
     for (float& distance : scaled.distances) distance = static_cast<float>(distance * mean_free_path);

@@ -30,6 +30,9 @@ Rgb eval(const Ramp& ramp, float r);
 // What preserve_energy multiplies each channel by: ∫ r Rd dr / ∫ r Rd ramp dr, or 1 where it is off.
 Rgb energy_scale(const Ramp& ramp, const Profile& profile);
 
+// The hat function of knot k: white there, black at its neighbours, so that colours times hats sum to the ramp.
+Ramp hat(const Ramp& ramp, std::size_t k);
+
 // A ramp whose distances were given in mean free paths, in metres.
 Ramp in_metres(const Ramp& ramp, double mean_free_path);
 
