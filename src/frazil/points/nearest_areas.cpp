@@ -112,6 +112,12 @@ class TileSharer {
             return;
         }
         drop_dominated(candidates_.data(), count, nearest, kept_);
+        // The nearest first: they cut most, and the parts of far ones are soon seen to be empty.
+        std::sort(kept_.begin(), kept_.end(), [&](int a, int b) {
+            const double *p = candidates_[a].d, *q = candidates_[b].d;
+            const double near_a = p[0] + p[1] + p[2], near_b = q[0] + q[1] + q[2];
+            return near_a != near_b ? near_a < near_b : a < b;
+        });
         shares_.clear();
         double total = 0.0;
         for (std::size_t i = 0; i + 1 < kept_.size(); ++i) {
