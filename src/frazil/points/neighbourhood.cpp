@@ -64,7 +64,7 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
             if (row == 0) continue;
             const float dy = gap(y, 1);
             for (; row != 0; row &= row - 1) {
-                const int x = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(row));
+                const int x = std::countr_zero(row);
                 const std::size_t cell = (z * cells_ + y) * cells_ + x;
                 const float dx = gap(x, 0);
                 if (dx * dx + dy * dy + dz * dz > reach2) continue;
