@@ -64,29 +64,43 @@ def test_nothing_absorbed_means_albedo_one(kind):
     np.testing.assert_allclose(kind(CLEAR).albedo, 1.0, rtol=1e-6)
 
 
-def diffuse_reflectance_of_a_walk(alpha: float, count: int = 60000, seed: int = 1) -> float:
-    """Multiply scattered light that leaves an index-matched isotropic half space lit straight down, by random walk."""
+def reflectance_of_a_walk(alpha: float, count: int = 60000, seed: int = 1) -> tuple[float, float]:
+    """What leaves an index-matched isotropic half space lit straight down: by more than one scattering, and in all."""
     rng = np.random.default_rng(seed)
-    depth = rng.exponential(size=count)
-    weight = np.full(count, alpha)
-    total, orders = 0.0, 0
+    depth, weight = rng.exponential(size=count), np.full(count, alpha)
+    single, multiple, order = 0.0, 0.0, 1
     while depth.size and weight.max() > 1e-5:
-        cosine = rng.uniform(-1, 1, depth.size)
-        depth = depth - cosine * rng.exponential(size=depth.size)
+        depth = depth - rng.uniform(-1, 1, depth.size) * rng.exponential(size=depth.size)
         out = depth < 0
-        total += weight[out].sum() if orders else 0.0
+        if order == 1:
+            single = weight[out].sum()
+        else:
+            multiple += weight[out].sum()
         depth, weight = depth[~out], weight[~out] * alpha
-        orders += 1
-    return total / count
+        order += 1
+    return multiple / count, (single + multiple) / count
 
 
-@pytest.mark.parametrize(("alpha", "standard", "better"), [(0.5, 0.16, 0.03), (0.9, 0.16, 0.03), (0.99, 0.06, 0.02)])
-def test_albedo_against_a_random_walk(alpha, standard, better):
-    """Differences of total multiple scattering from the walk, absolute; docs/translucency.md tells them."""
+@pytest.mark.parametrize("alpha", [0.5, 0.8, 0.9, 0.95, 0.99])
+def test_albedo_against_a_random_walk(alpha):
+    """The standard dipole's total is that of all orders but for 0.04; the better dipole lies between them."""
     medium = fz.Medium(alpha, 1.0 - alpha, eta=1.0)
-    walk = diffuse_reflectance_of_a_walk(alpha)
-    assert abs(fz.Dipole(medium).albedo[0] - walk) < standard
-    assert abs(fz.BetterDipole(medium).albedo[0] - walk) < better
+    multiple, everything = reflectance_of_a_walk(alpha)
+    assert abs(fz.Dipole(medium).albedo[0] - everything) < 0.04
+    assert multiple < fz.BetterDipole(medium).albedo[0] < everything
+
+
+def test_same_bits_alone_and_among_threads():
+    """Two gathers of one set agree to the bit, whatever the threads do; a shuffled set may differ by the tolerance."""
+    points = sphere(20000)
+    rng = np.random.default_rng(6)
+    irradiance = rng.uniform(0, 1, (20000, 3))
+    trees = [fz.PointTree(points, irradiance, fz.Dipole(MEDIUM)) for _ in range(2)]
+    where = rng.normal(size=(3000, 3))
+    where /= np.linalg.norm(where, axis=1, keepdims=True)
+    one, two = (tree.gather(where) for tree in trees)
+    assert one.exitance.tobytes() == two.exitance.tobytes()
+    assert one.coverage.tobytes() == two.coverage.tobytes()
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
