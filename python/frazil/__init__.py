@@ -4,6 +4,7 @@ import importlib
 from typing import Any
 
 from ._frazil import (
+    BetterDipole,
     Camera,
     ControlMesh,
     CylinderLight,
@@ -50,6 +51,7 @@ _LAZY = {
 }
 
 __all__ = [
+    "BetterDipole",
     "Camera",
     "ControlMesh",
     "CylinderLight",

@@ -45,9 +45,10 @@ def test_dipole_equals_its_formula():
         np.testing.assert_allclose(fz.Dipole(medium).reflectance(r), dipole_numpy(medium, np.float32(r)), rtol=2e-5)
 
 
+@pytest.mark.parametrize("kind", [fz.Dipole, fz.BetterDipole])
 @pytest.mark.parametrize("medium", [MEDIUM, MATCHED])
-def test_dipole_integrates_to_its_albedo(medium):
-    profile = fz.Dipole(medium)
+def test_profiles_integrate_to_their_albedo(medium, kind):
+    profile = kind(medium)
     for c in range(3):
         total = integrate.quad(
             lambda x, c=c: 2 * np.pi * np.exp(2 * x) * float(profile.reflectance(np.exp(x))[0, c]), -14, 3, limit=400
@@ -58,8 +59,61 @@ def test_dipole_integrates_to_its_albedo(medium):
     assert part == pytest.approx(profile.within(0.1)[0, 0], rel=1e-4)
 
 
-def test_nothing_absorbed_means_albedo_one():
-    np.testing.assert_allclose(fz.Dipole(CLEAR).albedo, 1.0, rtol=1e-6)
+@pytest.mark.parametrize("kind", [fz.Dipole, fz.BetterDipole])
+def test_nothing_absorbed_means_albedo_one(kind):
+    np.testing.assert_allclose(kind(CLEAR).albedo, 1.0, rtol=1e-6)
+
+
+def reflectance_of_a_walk(alpha: float, count: int = 60000, seed: int = 1) -> tuple[float, float]:
+    """What leaves an index-matched isotropic half space lit straight down: by more than one scattering, and in all."""
+    rng = np.random.default_rng(seed)
+    depth, weight = rng.exponential(size=count), np.full(count, alpha)
+    single, multiple, order = 0.0, 0.0, 1
+    while depth.size and weight.max() > 1e-5:
+        depth = depth - rng.uniform(-1, 1, depth.size) * rng.exponential(size=depth.size)
+        out = depth < 0
+        if order == 1:
+            single = weight[out].sum()
+        else:
+            multiple += weight[out].sum()
+        depth, weight = depth[~out], weight[~out] * alpha
+        order += 1
+    return multiple / count, (single + multiple) / count
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.8, 0.9, 0.95, 0.99])
+def test_albedo_against_a_random_walk(alpha):
+    """The standard dipole's total is that of all orders but for 0.04; the better dipole lies between them."""
+    medium = fz.Medium(alpha, 1.0 - alpha, eta=1.0)
+    multiple, everything = reflectance_of_a_walk(alpha)
+    assert abs(fz.Dipole(medium).albedo[0] - everything) < 0.04
+    assert multiple < fz.BetterDipole(medium).albedo[0] < everything
+
+
+def test_same_bits_alone_and_among_threads():
+    """Two gathers of one set agree to the bit, whatever the threads do; a shuffled set may differ by the tolerance."""
+    points = sphere(20000)
+    rng = np.random.default_rng(6)
+    irradiance = rng.uniform(0, 1, (20000, 3))
+    trees = [fz.PointTree(points, irradiance, fz.Dipole(MEDIUM)) for _ in range(2)]
+    where = rng.normal(size=(3000, 3))
+    where /= np.linalg.norm(where, axis=1, keepdims=True)
+    one, two = (tree.gather(where) for tree in trees)
+    assert one.exitance.tobytes() == two.exitance.tobytes()
+    assert one.coverage.tobytes() == two.coverage.tobytes()
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_white_furnace(estimator):
+    """Nothing absorbed, light 1 from all around: 1 everywhere with `conserve`, on the tip of a spire as in the valley."""
+    profile = fz.Dipole(fz.Medium(20.0, 0.0, eta=1.31))
+    points = cone(0.15, 150, 1e-3, 3.0)
+    tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)
+    where = np.concatenate([[[0, 0, 0]], points.positions[points.positions[:, 2] > -1][::37]])
+    out = tree.gather(where, estimator=estimator)
+    assert out.exitance[0].max() < 0.3
+    gain = fz.area_compensation(out.coverage, profile, mode="conserve", limit=100.0)
+    np.testing.assert_allclose(out.exitance[:, 0] * gain, 1.0, atol=0.02)
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.31, 1.5])

@@ -135,7 +135,8 @@ void bind_profile(nb::module_& module, const char* name, const char* doc) {
 
 Profile to_profile(nb::handle object) {
     if (nb::isinstance<Dipole>(object)) return nb::cast<const Dipole&>(object);
-    throw ValueError(str("profile must be a Dipole, got ", nb::repr(object.type()).c_str(), "."));
+    if (nb::isinstance<BetterDipole>(object)) return nb::cast<const BetterDipole&>(object);
+    throw ValueError(str("profile must be a Dipole or BetterDipole, got ", nb::repr(object.type()).c_str(), "."));
 }
 
 }  // namespace
@@ -182,6 +183,7 @@ void bind_translucency(nb::module_& module) {
         });
 
     bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.");
+    bind_profile<BetterDipole>(module, "BetterDipole", "The better dipole of d'Eon 2012.");
 
     nb::class_<Ramp>(module, "Ramp",
                      "A colour for every distance between where light enters and where it leaves.\n\n"

@@ -18,6 +18,19 @@ double reflected_fraction(double cos_theta, double eta) {
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
+// ∫ F(cos) cos^power dcos.
+double fresnel_moment(double eta, int power) {
+    if (eta == 1.0) return 0.0;
+    // Below the critical angle's cosine all is reflected; what is left is smooth but for a square root at that end,
+    // which cos = c + (1 - c) s² removes.
+    const double critical = eta < 1.0 ? std::sqrt(1.0 - eta * eta) : 0.0;
+    const auto integrand = [&](double s) {
+        const double mu = critical + (1.0 - critical) * s * s;
+        return reflected_fraction(mu, eta) * std::pow(mu, power) * 2.0 * s * (1.0 - critical);
+    };
+    return std::pow(critical, power + 1) / (power + 1) + integrate_gauss32(integrand, 0.0, 1.0);
+}
+
 }  // namespace
 
 float fresnel_dielectric(float cos_theta, float eta) {
@@ -29,15 +42,11 @@ float fresnel_average(float eta) {
 }
 
 double fresnel_average_exact(double eta) {
-    if (eta == 1.0) return 0.0;
-    // Below the critical angle's cosine all is reflected; what is left is smooth but for a square root at that end,
-    // which cos = c + (1 - c) s² removes.
-    const double critical = eta < 1.0 ? std::sqrt(1.0 - eta * eta) : 0.0;
-    const auto integrand = [&](double s) {
-        const double mu = critical + (1.0 - critical) * s * s;
-        return reflected_fraction(mu, eta) * mu * 2.0 * s * (1.0 - critical);
-    };
-    return critical * critical + 2.0 * integrate_gauss32(integrand, 0.0, 1.0);
+    return 2.0 * fresnel_moment(eta, 1);
+}
+
+double fresnel_second_moment(double eta) {
+    return 3.0 * fresnel_moment(eta, 2);
 }
 
 }  // namespace frazil

@@ -13,5 +13,7 @@ float fresnel_dielectric(float cos_theta, float eta);
 float fresnel_average(float eta);
 // The same in double precision.
 double fresnel_average_exact(double eta);
+// 3 ∫ F(cos) cos² dcos.
+double fresnel_second_moment(double eta);
 
 }  // namespace frazil

@@ -8,12 +8,13 @@
 #include <variant>
 
 #include "frazil/base/vec.h"
+#include "frazil/translucency/better_dipole.h"
 #include "frazil/translucency/dipole.h"
 #include "frazil/translucency/medium.h"
 
 namespace frazil {
 
-using Profile = std::variant<Dipole>;
+using Profile = std::variant<Dipole, BetterDipole>;
 
 // Rd(r): exitance per unit of area and of irradiance times area that enters at distance r.
 Rgb reflectance(const Profile& profile, float r);
