@@ -287,6 +287,26 @@ class Dipole:
     @property
     def medium(self) -> Medium: ...
 
+class BetterDipole:
+    """The better dipole of d'Eon 2012."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
 class Ramp:
     """
     A colour for every distance between where light enters and where it leaves.
