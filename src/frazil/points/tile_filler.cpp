@@ -136,12 +136,19 @@ void TileFiller::throw_darts() {
         total += 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).length() / (r * r);
         cumulative_.push_back(total);
     }
+    // Where to begin to look for a share of the area, so that no dart searches far.
+    guide_.resize(cumulative_.size());
+    for (std::size_t i = 0, first = 0; i < guide_.size(); ++i) {
+        while (first + 1 < cumulative_.size() && cumulative_[first] <= total * double(i) / double(guide_.size()))
+            ++first;
+        guide_[i] = static_cast<std::uint32_t>(first);
+    }
     const auto count = static_cast<std::uint64_t>(std::ceil(total * kUniformDarts));
     for (std::uint64_t i = 0; i < count; ++i) {
         const double at = random() * total;
-        const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), at);
-        if (found == cumulative_.end()) continue;
-        const Fragment& fragment = fragments_[found - cumulative_.begin()];
+        std::size_t chosen = guide_[std::min<std::size_t>(guide_.size() - 1, std::size_t(at / total * guide_.size()))];
+        while (chosen + 1 < cumulative_.size() && cumulative_[chosen] <= at) ++chosen;
+        const Fragment& fragment = fragments_[chosen];
         float u = random(), v = random();
         if (u + v > 1.0f) {
             u = 1.0f - u;

@@ -73,7 +73,7 @@ class TileFiller {
     std::vector<Dart>* darts_ = nullptr;
     std::vector<Fragment> fragments_;
     std::vector<double> cumulative_;
-    std::vector<std::uint32_t> order_;
+    std::vector<std::uint32_t> guide_, order_;
     Neighbourhood near_;
     std::vector<CornerDistances> candidates_;
     std::vector<int> kept_;
