@@ -30,12 +30,6 @@ PixelFilter filter_named(const std::string& name) {
     throw ValueError(str("render: filter must be box or blackman_harris, got '", name, "'."));
 }
 
-Estimator estimator_named(const std::string& name) {
-    if (name == "noise_free") return Estimator::noise_free;
-    if (name == "sum") return Estimator::sum;
-    throw ValueError(str("render: estimator must be noise_free or sum, got '", name, "'."));
-}
-
 nb::dict layers_of(RenderResult& result, nb::handle owner) {
     nb::dict layers;
     const auto height = static_cast<std::size_t>(result.film.height),

@@ -94,12 +94,6 @@ std::pair<std::vector<Rgb>, std::size_t> to_irradiance(nb::handle object) {
     return {std::vector<Rgb>(begin, begin + array.size() / 3), dimensions == 3 ? array.shape(1) : 1};
 }
 
-Estimator estimator_named(const std::string& name) {
-    if (name == "noise_free") return Estimator::noise_free;
-    if (name == "sum") return Estimator::sum;
-    throw ValueError(str("PointTree: estimator must be 'noise_free' or 'sum', got '", name, "'."));
-}
-
 CompensationMode mode_named(const std::string& name) {
     if (name == "off") return CompensationMode::off;
     if (name == "ratio") return CompensationMode::ratio;

@@ -1,6 +1,5 @@
 // The Python face of the core: one bind_*.cpp per stage, and the conversions that they share.
-// Model: nanobind; arrays come in by reference and go out as numpy views that keep their owner alive. The GIL is
-// released
+// Model: nanobind; arrays come in by reference and go out as numpy views that keep their owner alive. The GIL is released
 //   around every call that computes.
 // Not: logic of any kind.
 #pragma once
@@ -13,6 +12,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/vec.h"
+#include "frazil/translucency/point_tree.h"
 
 namespace frazil {
 
@@ -45,6 +45,9 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
 using MatrixArray = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 M44f to_matrix(const MatrixArray& array);
 nb::object from_matrix(const M44f& matrix);
+
+// ValueError for any other name.
+Estimator estimator_named(const std::string& name);
 
 void bind_geometry(nb::module_& module);
 void bind_material(nb::module_& module);

@@ -26,6 +26,12 @@ std::vector<V3i> to_indices3(const IntArray& array, const char* what) {
     return to_vectors<V3i, std::int32_t>(array, what, 3);
 }
 
+Estimator estimator_named(const std::string& name) {
+    if (name == "noise_free") return Estimator::noise_free;
+    if (name == "sum") return Estimator::sum;
+    throw ValueError(str("estimator must be noise_free or sum, got '", name, "'."));
+}
+
 }  // namespace frazil
 
 NB_MODULE(_frazil, module) {

@@ -1,10 +1,11 @@
 #include "frazil/lighting/irradiance.h"
 
 #include <atomic>
-#include <numeric>
 
 #include "frazil/base/error.h"
+#include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
+#include "frazil/base/radix_sort.h"
 #include "frazil/base/sampler.h"
 #include "frazil/base/trigonometry.h"
 
@@ -34,29 +35,16 @@ class EntryTable {
     std::vector<float> values_;
 };
 
-// The interleaved bits of a point's cell in a 1024³ grid over the bounds: neighbours on this curve trace similar rays.
-std::uint32_t morton_code(const V3f& p, const Box3f& box) {
-    std::uint32_t code = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const float size = std::max(box.max[axis] - box.min[axis], 1e-30f);
-        std::uint32_t x = std::uint32_t(std::clamp((p[axis] - box.min[axis]) / size, 0.0f, 1.0f) * 1023.0f);
-        x = (x | (x << 16)) & 0x030000ffU;
-        x = (x | (x << 8)) & 0x0300f00fU;
-        x = (x | (x << 4)) & 0x030c30c3U;
-        x = (x | (x << 2)) & 0x09249249U;
-        code |= x << axis;
-    }
-    return code;
-}
-
+// Points along a Morton curve: neighbours on it trace similar rays.
 std::vector<std::uint32_t> spatial_order(const std::vector<V3f>& positions) {
     Box3f box;
     for (const V3f& p : positions) box.extendBy(p);
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> keys(positions.size());
-    for (std::uint32_t i = 0; i < positions.size(); ++i) keys[i] = {morton_code(positions[i], box), i};
-    std::sort(keys.begin(), keys.end());
+    const MortonGrid grid(box);
+    std::vector<KeyedIndex> keys(positions.size()), scratch;
+    for (std::uint32_t i = 0; i < positions.size(); ++i) keys[i] = {grid.code(positions[i]), i};
+    radix_sort(keys, 3 * kMortonBits, scratch);
     std::vector<std::uint32_t> order(keys.size());
-    for (std::size_t i = 0; i < keys.size(); ++i) order[i] = keys[i].second;
+    for (std::size_t i = 0; i < keys.size(); ++i) order[i] = keys[i].index;
     return order;
 }
 

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "frazil/base/error.h"
+#include "frazil/points/point_budget.h"
 #include "frazil/points/poisson.h"
 #include "frazil/render/stopwatch.h"
 
@@ -11,7 +12,6 @@ namespace frazil {
 namespace {
 
 constexpr double kPointsOfDefaultSpacing = 1e6;
-constexpr double kPointDensity = 0.7;  // points per area / spacing² that maximal Poisson-disk sampling gives
 
 // Lengths and angles of the matrix's axes: equal for matrices that differ by a rotation, reflection or move.
 std::array<float, 6> metric(const M44f& m) {
@@ -66,7 +66,7 @@ float point_spacing(const IceMaterial& material, double area, const RenderOption
     if (spacing == 0.0f) spacing = material.spacing;
     if (spacing == 0.0f) {
         const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
-        const double finest = std::sqrt(kPointDensity * area / kPointsOfDefaultSpacing);
+        const double finest = std::sqrt(kPointsPerSpacing2 * area / kPointsOfDefaultSpacing);
         spacing = std::max(1.0f / max_component(sigma_t_prime), static_cast<float>(finest));
     }
     return spacing * options.spacing_scale;
