@@ -56,7 +56,8 @@ SCRIPTS = {
     + "B, I, P = igl.blue_noise(V, F.astype(np.int64), spacing)[:3]\n"
     + FINISH,
     "open3d": COMMON
-    + "import open3d as o3d\nm = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(V), o3d.utility.Vector3iVector(F))\n"
+    + "import open3d as o3d\n"
+    + "m = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(V), o3d.utility.Vector3iVector(F))\n"
     + BASE
     + "P = np.asarray(m.sample_points_poisson_disk(count).points)\n"
     + FINISH,
@@ -160,7 +161,9 @@ def write(rows: list[dict], output: Path, mesh: Path, area: float) -> None:
     for row in rows:
         if "correlation" in row and row["asked"] == least:
             axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"])
-    axis.set(xlabel="distance / median nearest distance", ylabel="pair correlation", title=f"{mesh.name}, {least:,} points")
+    axis.set(
+        xlabel="distance / median nearest distance", ylabel="pair correlation", title=f"{mesh.name}, {least:,} points"
+    )
     axis.legend()
     figure.savefig(output.with_suffix(".png"), dpi=120, bbox_inches="tight")
 
@@ -191,9 +194,7 @@ def main() -> None:
             reference = None
             for name in options.only:
                 python = sys.executable if name.startswith("frazil") else peers
-                got = run(
-                    python, name, folder / "mesh.npz", count, spacing, options.threads, folder, options.limit
-                )
+                got = run(python, name, folder / "mesh.npz", count, spacing, options.threads, folder, options.limit)
                 row = {"sampler": name, "asked": count}
                 if isinstance(got, str):
                     rows.append(row | {"error": got})

@@ -12,7 +12,7 @@ from dual_contouring import Surface
 from ice_body import IceBody
 from noise import Noise, swirl
 
-kSnowRoot = 0.02  # metres that snow reaches into the ice below
+kSnowRoot = 0.05  # metres that snow reaches into the ice below
 
 
 class Rock:
@@ -62,7 +62,7 @@ class Snow:
         patch = 0.75 + 0.45 * self._ice.noise(p, 0.42, 110)
         high = np.clip(1.25 - 0.30 * p[:, 1], 0.35, 1.2)
         depth = self._depth * np.clip(patch, 0.15, 1.2) * high
-        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + 0.5 * self._depth
+        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + 0.62 * self._depth
         result[near] = np.maximum(snow, -(ice[near] + kSnowRoot))
         return result
 

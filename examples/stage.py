@@ -165,7 +165,7 @@ def _lookups() -> tuple[np.ndarray, np.ndarray]:
     layer = np.linspace(1.0, 0.0, 64)[:, None, None]
     clear = kClearTint * (0.88 + 0.24 * layer)
     tint = clear * (1.0 - frost) + kWhiteTint * frost
-    roughness = (0.10 + 0.45 * frost) * np.ones((64, 64, 3))
+    roughness = (0.17 + 0.40 * frost) * np.ones((64, 64, 3))
     return tint, roughness
 
 

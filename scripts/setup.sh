@@ -67,10 +67,11 @@ install_packages() {
 
 make_venv() {
     local venv=$1 python
-    [ -x "$venv/bin/python" ] && "$venv/bin/python" -c pass 2>/dev/null && return
-    python=$(find_python) || fail "python3 must be >= 3.10 with venv and headers. Set PYTHON to one."
-    echo "setup: $venv with $python"
-    "$python" -m venv --clear "$venv"
+    if ! "$venv/bin/python" -c pass 2>/dev/null; then
+        python=$(find_python) || fail "python3 must be >= 3.10 with venv and headers. Set PYTHON to one."
+        echo "setup: $venv with $python"
+        "$python" -m venv --clear "$venv"
+    fi
     # What venv brings is as old as the system: 22.0 on Ubuntu 22.04, which has no --config-settings.
     "$venv/bin/python" -m pip install -q --disable-pip-version-check --retries 5 "pip>=23.1"
 }

@@ -2,6 +2,7 @@ from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import numpy
+import numpy.typing
 from numpy.typing import NDArray
 
 
@@ -27,7 +28,7 @@ class Mesh:
     The arrays are copied; the properties are views of the mesh's own memory.
     """
 
-    def __init__(self, positions: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], triangles: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], normals: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None, uvs: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)] | None = None) -> None: ...
+    def __init__(self, positions: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, normals: numpy.typing.ArrayLike | None = None, uvs: numpy.typing.ArrayLike | None = None) -> None: ...
 
     @property
     def positions(self) -> NDArray[numpy.float32]: ...
@@ -35,16 +36,16 @@ class Mesh:
     @property
     def triangles(self) -> NDArray[numpy.int32]: ...
 
-    def set_normals(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+    def set_normals(self, values: numpy.typing.ArrayLike, interpolation: str | None = None) -> None:
         """
         Give normals; interpolation is constant, uniform (per triangle), vertex or corner, found from the length
         where it is not given.
         """
 
-    def set_uvs(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+    def set_uvs(self, values: numpy.typing.ArrayLike, interpolation: str | None = None) -> None:
         """Give texture coordinates; see set_normals."""
 
-    def set_colors(self, values: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], interpolation: str | None = None) -> None:
+    def set_colors(self, values: numpy.typing.ArrayLike, interpolation: str | None = None) -> None:
         """Give display colours, linear RGB; see set_normals."""
 
     @property
@@ -68,7 +69,7 @@ class Mesh:
     @property
     def colors_interpolation(self) -> str: ...
 
-    def submesh(self, triangles: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)]) -> Mesh:
+    def submesh(self, triangles: numpy.typing.ArrayLike) -> Mesh:
         """
         Some of the triangles, by their indices (N,) int32, with the vertices that they use.
         """
@@ -97,7 +98,7 @@ class ControlMesh:
     is_boundary_smooth : interpolateBoundary is edgeOnly.
     """
 
-    def __init__(self, points: Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], face_vertex_counts: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], face_vertex_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)], *, hole_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_lengths: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, crease_sharpnesses: Sequence[float] = [], corner_indices: Annotated[NDArray[numpy.int32], dict(order='C', device='cpu', writable=False)] | None = None, corner_sharpnesses: Sequence[float] = [], normals: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, uvs: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, colors: tuple[Annotated[NDArray[numpy.float32], dict(order='C', device='cpu', writable=False)], str] | None = None, is_boundary_smooth: bool = False) -> None: ...
+    def __init__(self, points: numpy.typing.ArrayLike, face_vertex_counts: numpy.typing.ArrayLike, face_vertex_indices: numpy.typing.ArrayLike, *, hole_indices: numpy.typing.ArrayLike | None = None, crease_indices: numpy.typing.ArrayLike | None = None, crease_lengths: numpy.typing.ArrayLike | None = None, crease_sharpnesses: Sequence[float] = [], corner_indices: numpy.typing.ArrayLike | None = None, corner_sharpnesses: Sequence[float] = [], normals: tuple[numpy.typing.ArrayLike, str] | None = None, uvs: tuple[numpy.typing.ArrayLike, str] | None = None, colors: tuple[numpy.typing.ArrayLike, str] | None = None, is_boundary_smooth: bool = False) -> None: ...
 
 def triangulate(cage: ControlMesh, path: str = 'ControlMesh') -> tuple[Mesh, NDArray[numpy.int32]]:
     """
@@ -140,6 +141,10 @@ class PointSet:
         """
 
     @property
+    def triangle_areas(self) -> NDArray[numpy.float32]:
+        """(N,) float32, m²: the area of each point's triangle, which `on` needs."""
+
+    @property
     def spacing(self) -> float:
         """The distance asked for, metres; the largest where it varies."""
 
@@ -152,33 +157,60 @@ class PointSet:
     def load(path: object) -> PointSet:
         """Read a file that save() wrote. OSError where it cannot be read."""
 
+    def on(self, mesh: Mesh) -> PointSet:
+        """
+        The same points, with the same ids, on another pose of the mesh that they were made on: positions, normals
+        and areas follow their triangles. ValueError where the pose has fewer triangles.
+        """
+
     def __len__(self) -> int: ...
 
     def __repr__(self) -> str: ...
 
-def poisson_points(mesh: Mesh, spacing: float, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet:
+def poisson_points_constant(mesh: Mesh, spacing: float, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
+
+def poisson_points_varying(mesh: Mesh, spacing: numpy.typing.ArrayLike, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
+
+def poisson_points_by_count(mesh: Mesh, spacing: int, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
+
+class PointStatistics:
+    """How good a point set is; distances in metres."""
+
+    @property
+    def count(self) -> int: ...
+
+    @property
+    def min_distance(self) -> float:
+        """Of any two points on the same side."""
+
+    @property
+    def mean_distance(self) -> float:
+        """From a point to its nearest."""
+
+    @property
+    def distance_spread(self) -> float:
+        """Its standard deviation over its mean."""
+
+    @property
+    def gap(self) -> float:
+        """The largest sampled distance from the surface to its nearest point."""
+
+    @property
+    def mean_area(self) -> float: ...
+
+    @property
+    def area_spread(self) -> float:
+        """Standard deviation of the areas over their mean."""
+
+    @property
+    def area_sum(self) -> float: ...
+
+    def __repr__(self) -> str: ...
+
+def point_statistics(points: PointSet, mesh: Mesh, thin_walls: bool = True, samples: int = 0) -> PointStatistics:
     """
-    Poisson-disk points on any mesh: never nearer than spacing, no surface farther than it from a point.
-
-    Parameters
-    ----------
-    mesh : Mesh, any triangle soup with some area.
-    spacing : float > 0, metres.
-    seed : int; the result depends on (mesh, spacing, seed) alone.
-    thin_walls : bool; True gives each side of a thin sheet its own points, False forbids any two points nearer
-        than spacing.
-    max_points : int; refuse to make more. 0 allows what fits into free memory.
-    threads : int; 0 takes all cores.
-    progress : callable (stage, fraction), optional.
-
-    Returns
-    -------
-    PointSet, about 0.7 area / spacing² points.
-
-    Raises
-    ------
-    ValueError
-        For spacing that is not > 0 or would make too many points, or a mesh without area.
+    Measure a point set: nearest pair, largest gap over `samples` places of the surface (0: ten a point, at least
+    100,000), spread of nearest distances and of areas.
     """
 
 def tessellated_points(mesh: Mesh, edge_length: float) -> PointSet:
@@ -255,6 +287,26 @@ class Dipole:
     @property
     def medium(self) -> Medium: ...
 
+class BetterDipole:
+    """The better dipole of d'Eon 2012."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
 class Ramp:
     """
     A colour for every distance between where light enters and where it leaves.
@@ -269,6 +321,11 @@ class Ramp:
 
     def __init__(self, distances: object, colors: object, preserve_energy: bool = False, mean_free_path: float = 1.0) -> None: ...
 
+    def energy_scale(self, profile: object) -> object:
+        """
+        What preserve_energy multiplies each channel by, (3,); 1 where it is off.
+        """
+
     def eval(self, r: object) -> object:
         """
         The factors at distances r (n,) in metres, (n, 3); preserve_energy is not in them.
@@ -279,6 +336,9 @@ class Gathered:
 
     @property
     def exitance(self) -> NDArray[numpy.float32]: ...
+
+    @property
+    def layers(self) -> NDArray[numpy.float32]: ...
 
     @property
     def coverage(self) -> NDArray[numpy.float32]: ...
@@ -299,11 +359,12 @@ class PointTree:
 
     def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None) -> None: ...
 
-    def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free') -> Gathered:
+    def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
         """
         Exitance and coverage at M positions (M, 3), in any order.
 
-        Returns an object with exitance (M, G, 3) and coverage (M, 3).
+        Returns an object with exitance (M, G, 3) and coverage (M, 3); with ramp_layers also layers (M, K, G, 3), the
+        exitance per hat function of the ramp: colours times layers sum to the exitance (times Ramp.energy_scale).
         """
 
     def gather_exact(self, positions: object, estimator: str = 'noise_free') -> Gathered:
@@ -323,6 +384,57 @@ def area_compensation(coverage: object, profile: object, mode: str = 'ratio', li
     """
     Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to add
     per unit of irradiance at the shading point.
+    """
+
+class RayScene:
+    """
+    Meshes that rays can hit.
+
+    Parameters
+    ----------
+    meshes : list of Mesh, in world space, metres. Copied.
+    """
+
+    def __init__(self, meshes: Sequence[Mesh]) -> None: ...
+
+    def are_occluded(self, origins: numpy.typing.ArrayLike, directions: numpy.typing.ArrayLike, t_max: float = float('inf')) -> object:
+        """
+        Whether anything lies on each ray: (M,) bool for origins and directions (M, 3).
+        """
+
+def light_groups(lights: Sequence[Light]) -> list[str]:
+    """
+    Names of the light groups in order of first appearance; '' is the default group. One default group where there
+    is no light.
+    """
+
+def bake_irradiance(points: object, scene: RayScene, lights: Sequence[Light], *, eta: float = 1.309999942779541, roughness: float = 0.0, samples: int = 64, seed: int = 0) -> object:
+    """
+    Irradiance that enters at points, with ray-traced shadows.
+
+    Parameters
+    ----------
+    points : PointSet, or any object with positions and normals (N, 3) float32, metres.
+    scene : RayScene that casts the shadows.
+    lights : list of Light; the translucency multiplier of each is applied.
+    eta : index of the body relative to the outside, 1 to 4; 1 lets all light in.
+    roughness : of the boundary, 0 to 1.
+    samples : shadow rays per point and light.
+    seed : changes the noise, not the expectation.
+
+    Returns
+    -------
+    (N, G, 3) float32, W/m²: one row per light group, see light_groups.
+
+    Raises
+    ------
+    ValueError
+        For lights, points or options out of range, by name.
+    """
+
+def measure_bake(points: object, scene: RayScene, lights: Sequence[Light], samples: int, is_bare: bool) -> tuple[int, float]:
+    """
+    (rays, seconds) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
     """
 
 class Texture:

@@ -65,7 +65,7 @@ def poisson_points(
     True
     """
     if not isinstance(mesh, Mesh):
-        raise TypeError(f"poisson_points: mesh must be a frazil.Mesh, got {type(mesh).__name__}. Make one of its arrays.")
+        raise TypeError(f"poisson_points: mesh must be a frazil.Mesh, got {type(mesh).__name__}. Make one of arrays.")
     if (spacing is None) == (count is None):
         raise ValueError("poisson_points: spacing or count must be given, and not both. Give one of them.")
     options = (seed, thin_walls, max_points, threads, progress)
@@ -79,7 +79,7 @@ def poisson_points(
         return _frazil.poisson_points_constant(mesh, spacing, *options)
     values = np.asarray(spacing)
     if values.ndim != 1:
-        raise ValueError(f"poisson_points: spacing must have shape (V,), got {values.shape}. Give one value per vertex.")
+        raise ValueError(f"poisson_points: spacing must have shape (V,), got {values.shape}. Give one a vertex.")
     return _frazil.poisson_points_varying(mesh, np.ascontiguousarray(values, np.float32), *options)
 
 
@@ -213,9 +213,7 @@ def _points_from_function(mesh: Mesh, function: SpacingFunction, options: tuple)
     own = np.stack([1 - u - v, u, v], axis=1)
     points.barycentrics[:] = np.einsum("nk,nkj->nj", own, weights[part])[:, 1:]
     points.triangles[:] = parents[part]
-    full = np.linalg.norm(
-        np.cross(*(mesh.positions.astype(np.float64)[triangles[:, k]] - mesh.positions[triangles[:, 0]] for k in (1, 2))),
-        axis=1,
-    )
-    points.triangle_areas[:] = 0.5 * full[points.triangles]
+    first, second, third = (mesh.positions.astype(np.float64)[triangles[:, k]] for k in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(second - first, third - first), axis=1)
+    points.triangle_areas[:] = areas[points.triangles]
     return points

@@ -141,14 +141,19 @@ def test_files_that_are_no_points(tmp_path):
     path = tmp_path / "points.ply"
     fz.poisson_points(fz.Mesh(*mesh_of(trimesh.creation.box())), 0.2).save(path)
     data = path.read_bytes()
-    for broken in (data[:-1], data[:300], b"", b"ply\n", data.replace(b"float area", b"float mass"),
-                   data.replace(b"binary_little", b"binary_big"), b"\x00" * 100):
+    for broken in (
+        data[:-1],
+        data[:300],
+        b"",
+        b"ply\n",
+        data.replace(b"float area", b"float mass"),
+        data.replace(b"binary_little", b"binary_big"),
+        b"\x00" * 100,
+    ):
         path.write_bytes(broken)
         with pytest.raises(OSError, match=f"{path}: file must"):
             fz.PointSet.load(path)
     with pytest.raises(OSError, match="must be readable"):
         fz.PointSet.load(tmp_path / "none.ply")
     with pytest.raises(OSError, match="must be writable"):
-        fz.poisson_points(
-            fz.Mesh(*mesh_of(trimesh.creation.box())), 1.0
-        ).save(tmp_path / "no" / "such.ply")
+        fz.poisson_points(fz.Mesh(*mesh_of(trimesh.creation.box())), 1.0).save(tmp_path / "no" / "such.ply")

@@ -51,6 +51,7 @@ def test_links_and_pictures_exist_and_are_small():
             assert (ROOT / target).stat().st_size < 400_000, target
 
 
+@pytest.mark.slow
 def test_the_python_lines_run(folder):
     result = run([sys.executable, "-c", blocks("python")[0]], folder)
     assert result.returncode == 0, result.stderr
@@ -58,6 +59,7 @@ def test_the_python_lines_run(folder):
     assert (folder / "out" / "ice.png").stat().st_size > 1_000
 
 
+@pytest.mark.slow
 def test_the_command_lines_run(folder):
     lines = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("frazil ")]
     assert lines

@@ -224,3 +224,33 @@ def test_reading_a_clean_stage_says_nothing(tmp_path, capfd):
         scene = fz.load_usd(tmp_path / "s.usda")
     assert scene.warnings == []
     assert capfd.readouterr() == ("", "")
+
+
+def test_the_same_scene_in_metres_and_centimetres_gives_the_same_picture(tmp_path):
+    from test_usd_materials import bind
+
+    pictures = []
+    for name, unit in (("m", 1.0), ("cm", 0.01)):
+        stage = new_stage(tmp_path / f"{name}.usda", meters_per_unit=unit)
+        size = 1.0 / unit
+        camera = UsdGeom.Camera(stage.GetPrimAtPath("/Camera"))
+        camera.AddTranslateOp().Set(Gf.Vec3d(0, 0, 3 * size))
+        camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * size, 100 * size))
+        camera.CreateFocalLengthAttr(20.0)
+        sphere = UsdGeom.Sphere.Define(stage, "/Ice")
+        sphere.CreateRadiusAttr(0.5 * size)
+        shader = bind(stage, sphere, "frazil:ice")
+        shader.CreateInput("albedo", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(0.6, 0.8, 0.9))
+        shader.CreateInput("mean_free_path", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(0.05, 0.08, 0.1) * size)
+        light = UsdLux.RectLight.Define(stage, "/Light")
+        light.CreateWidthAttr(2 * size)
+        light.CreateHeightAttr(size)
+        light.CreateNormalizeAttr(True)
+        light.CreateIntensityAttr(8)
+        light.AddTranslateOp().Set(Gf.Vec3d(0, 0, 2 * size))
+        pictures.append(fz.render(load(stage), resolution=(32, 18), samples=4).layers["translucency"])
+    metres, centimetres = (np.asarray(picture) for picture in pictures)
+    assert metres.max() > 0.1
+    # Only rounding differs; points may fall elsewhere where a tie breaks the other way.
+    assert abs(metres.mean() / centimetres.mean() - 1) < 0.01
+    np.testing.assert_allclose(metres, centimetres, atol=0.05 * metres.max())

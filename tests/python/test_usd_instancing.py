@@ -178,14 +178,23 @@ def test_an_instancer_that_instances_itself_ends(stage):
     # and through another one
     other = define_instancer(stage, "/Other")
     other.CreatePrototypesRel().SetTargets(["/Points"])
-    instancer.GetPositionsAttr().Set([Gf.Vec3f(0)])
-    other.GetPositionsAttr().Set([Gf.Vec3f(0)])
-    instancer.GetProtoIndicesAttr().Set([0])
-    other.GetProtoIndicesAttr().Set([0])
     instancer.GetPrototypesRel().SetTargets(["/Other"])
     scene = load(stage)
     assert len(scene.objects) == 1
-    assert any("nested more than" in w for w in scene.warnings)
+    assert any("instances itself" in w for w in scene.warnings)
+
+
+def test_more_instances_than_memory_holds_are_refused(stage, monkeypatch):
+    from frazil.usd import instancing
+
+    monkeypatch.setattr(instancing, "_MOST_INSTANCES", 2)
+    add_quad(stage, "/Good")
+    instancer = define_instancer(stage)
+    add_quad(stage, "/Points/Quad")
+    instancer.CreatePrototypesRel().SetTargets(["/Points/Quad"])
+    scene = load(stage)
+    assert [o.path for o in scene.objects] == ["/Good"]
+    assert any("/Points: must have at most 2 instances in all, got 3" in w for w in scene.warnings)
 
 
 def test_scale_of_zero_leaves_out_that_instance_only(stage):

@@ -337,6 +337,16 @@ def test_a_binding_to_nothing_is_named(stage):
     assert any(w.startswith("/Quad: is bound to </Nowhere>") for w in scene.warnings)
 
 
+def test_a_texture_with_values_of_the_wrong_type_does_not_lose_the_mesh(stage, tmp_path):
+    write_image(tmp_path / "t.png", np.full((1, 1, 3), 0.5))
+    shader = bind_preview(stage, add_quad(stage, "/Quad"))
+    wrong = {"scale": (Sdf.ValueTypeNames.String, "large")}
+    connect_texture(stage, shader, "diffuseColor", COLOR, tmp_path / "t.png", **wrong)
+    model, scene = read_model(stage)
+    assert model.uses_display_color
+    assert any(w.startswith("/Material: ") for w in scene.warnings)
+
+
 def test_geom_subsets_split_the_mesh(stage):
     from usd_stages import add_mesh
 

@@ -57,7 +57,7 @@ def points_command(
         else:
             points.save(output)
     except (ValueError, OSError) as error:
-        typer.echo(str(error), err=True)
+        typer.echo(f"frazil: error: {error}", err=True)
         raise typer.Exit(1) from None
     typer.echo(f"{len(points)} points, spacing {points.spacing:.6g}, area {points.areas.sum(dtype='f8'):.6g}: {output}")
     if stats:

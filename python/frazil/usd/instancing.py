@@ -15,7 +15,7 @@ from .lights import add_light, is_light
 from .materials import MaterialReader
 
 _GPRIMS = frozenset({"Sphere", "Cube", "Cone", "Cylinder", "Cylinder_1", "Capsule", "Capsule_1", "Plane"})
-_DEEPEST_NESTING = 16
+_MOST_INSTANCES = 10_000_000  # of one PointInstancer, those of what holds it multiplied in
 
 # What a stage shows: active, loaded, defined, not abstract; and inside native instances too.
 _STAGE_PRIMS = Usd.TraverseInstanceProxies()
@@ -37,7 +37,7 @@ class StageWalker:
         context = self._context
         for prim in self._leaves(context.stage.GetPseudoRoot(), _STAGE_PRIMS):
             matrix = context.local_to_world(prim)
-            self._place(prim, matrix[None], [str(prim.GetPath())], depth=0)
+            self._place(prim, matrix[None], [str(prim.GetPath())], inside=())
 
     def _leaves(self, root: Usd.Prim, predicate) -> Iterator[Usd.Prim]:
         """Geometry, lights and PointInstancers under (and at) root that are visible and of a wanted purpose."""
@@ -74,18 +74,18 @@ class StageWalker:
                     prim.GetPath(), f"model:drawMode '{mode}' is not supported. Its full geometry is rendered."
                 )
 
-    def _place(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], depth: int) -> None:
+    def _place(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], inside: tuple[str, ...]) -> None:
         """Add the leaf once per matrix (N, 4, 4), prim to world, under the N names; a warning where it is broken."""
         try:
-            self._place_unchecked(prim, matrices, paths, depth)
+            self._place_unchecked(prim, matrices, paths, inside)
         except (ValueError, TypeError, Tf.ErrorException) as error:
             # One broken prim must not lose the scene.
             said = " ".join(str(error).removeprefix(f"{prim.GetPath()}: ").split())
             self._context.warn(prim.GetPath(), f"{said} It is left out.")
 
-    def _place_unchecked(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], depth: int) -> None:
+    def _place_unchecked(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], inside: tuple[str, ...]) -> None:
         if prim.IsA(UsdGeom.PointInstancer):
-            self._place_instancer(prim, matrices, paths, depth)
+            self._place_instancer(prim, matrices, paths, inside)
         elif prim.IsA(UsdGeom.Gprim):
             if is_light(prim):
                 self._context.warn(prim.GetPath(), "geometry as a light (MeshLightAPI) is not supported. It is dark.")
@@ -137,13 +137,20 @@ class StageWalker:
 
     # -- PointInstancer
 
-    def _place_instancer(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], depth: int) -> None:
+    def _place_instancer(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], inside: tuple[str, ...]) -> None:
         context = self._context
-        if depth >= _DEEPEST_NESTING:
-            context.warn(prim.GetPath(), f"is nested more than {_DEEPEST_NESTING} deep. It is left out.")
+        if str(prim.GetPath()) in inside:
+            context.warn(prim.GetPath(), "is a PointInstancer that instances itself. It is left out there.")
             return
+        inside = (*inside, str(prim.GetPath()))
         roots = self._prototype_roots(prim)
         numbers, own, prototypes = self._instances(prim, roots)
+        if len(numbers) * len(paths) > _MOST_INSTANCES:
+            asked = len(numbers) * len(paths)
+            context.warn(
+                prim.GetPath(), f"must have at most {_MOST_INSTANCES} instances in all, got {asked}. It is left out."
+            )
+            return
         for index, root in enumerate(roots):
             chosen = np.flatnonzero(prototypes == index)
             if root is None or len(chosen) == 0:
@@ -155,7 +162,7 @@ class StageWalker:
             for leaf in self._leaves(root, _PROTOTYPE_PRIMS):
                 relative, _ = context.transforms.ComputeRelativeTransform(leaf, root)
                 suffix = str(leaf.GetPath())[prefix:]
-                self._place(leaf, to_array(relative) @ placed, [name + suffix for name in names], depth + 1)
+                self._place(leaf, to_array(relative) @ placed, [name + suffix for name in names], inside)
 
     def _prototype_roots(self, prim: Usd.Prim) -> list[Usd.Prim | None]:
         roots: list[Usd.Prim | None] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Sdf, Usd, UsdLux
 
 from .._frazil import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, Scene, SphereLight
 from .context import ReadContext, is_singular
@@ -71,12 +71,10 @@ def add_grey_dome(context: ReadContext, scene: Scene) -> None:
 
 def _get(context: ReadContext, prim: Usd.Prim, name: str, default):
     """An input: inputs:NAME, or NAME alone as before USD 21.02."""
-    for attribute in (prim.GetAttribute(f"inputs:{name}"), prim.GetAttribute(name)):
-        if attribute and (attribute.HasAuthoredValue() or attribute.GetName().startswith("inputs:")):
-            if attribute.HasAuthoredValue() or not prim.GetAttribute(name).IsAuthored():
-                return context.get(attribute, default)
-    attribute = prim.GetAttribute(name)
-    return context.get(attribute, default) if attribute else default
+    attribute, older = prim.GetAttribute(f"inputs:{name}"), prim.GetAttribute(name)
+    if not (attribute and attribute.HasAuthoredValue()) and older and older.HasAuthoredValue():
+        attribute = older
+    return context.get(attribute, default)
 
 
 def _number(context: ReadContext, prim: Usd.Prim, name: str, default: float) -> float:
@@ -172,7 +170,8 @@ def _warn_of_unsupported(context: ReadContext, prim: Usd.Prim) -> None:
             if name == "shaping:cone:angle" and context.get(attribute) >= 90.0:
                 continue
             context.warn(path, f"inputs:{name} is not supported. The light shines unshaped.", once="shaping")
-    if prim.GetRelationship("light:filters").GetTargets() if prim.GetRelationship("light:filters") else False:
+    filters = prim.GetRelationship("light:filters")
+    if filters and filters.GetTargets():
         context.warn(path, "light filters are not supported. They are left out.")
     for collection in ("lightLink", "shadowLink"):
         for relation in ("includes", "excludes"):
@@ -182,8 +181,3 @@ def _warn_of_unsupported(context: ReadContext, prim: Usd.Prim) -> None:
     enable = prim.GetAttribute("inputs:shadow:enable")
     if enable and context.get(enable) is False:
         context.warn(path, "inputs:shadow:enable = false is not supported. The light casts shadows.")
-
-
-def is_gprim_light(prim: Usd.Prim) -> bool:
-    """Whether the prim is geometry that was made a light (MeshLightAPI)."""
-    return prim.IsA(UsdGeom.Gprim)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdShade
+from pxr import Tf, Usd, UsdShade
 
 from .._frazil import IceMaterial, Medium, Scene, StandardMaterial
 from .context import ReadContext
@@ -76,7 +76,12 @@ class MaterialReader:
 
     def _add(self, path: str, read) -> BoundMaterial:
         if path not in self._known:
-            model, texcoord_name = read()
+            try:
+                model, texcoord_name = read()
+            except (ValueError, TypeError, Tf.ErrorException) as error:
+                # A broken material must not lose the meshes that it is bound to.
+                self._context.warn(path, f"{' '.join(str(error).split())} displayColor is shown.")
+                model, texcoord_name = StandardMaterial(uses_display_color=True), None
             index = self._scene.add_material(path or "displayColor", model)
             self._known[path] = BoundMaterial(index, texcoord_name)
         return self._known[path]

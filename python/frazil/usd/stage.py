@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -162,6 +163,12 @@ def _first_line(error: Tf.ErrorException) -> str:
 
 
 def _pass_on(context: ReadContext, diagnostics: UsdUtils.CoalescingDiagnosticDelegate) -> None:
-    """USD's own messages (broken references and the like) as warnings."""
+    """USD's own messages (broken references and the like) as warnings, under the prim that they are about."""
     for diagnostic in diagnostics.TakeUncoalescedDiagnostics():
-        context.warn(context.file, f"USD: {' '.join(diagnostic.commentary.split())}")
+        text = " ".join(diagnostic.commentary.split())
+        text = re.sub(r"\s*\((re)?composing stage.*\)$|\s*\(instantiating stage.*\)$", "", text)
+        about = re.match(r"In <([^>]+)>: (.*)", text)
+        if about:
+            context.warn(about[1], about[2])
+        else:
+            context.warn(context.file, f"USD says: {text}")

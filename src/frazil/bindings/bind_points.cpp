@@ -38,10 +38,16 @@ void bind_points(nb::module_& module) {
     nb::class_<PointSet>(module, "PointSet",
                          "Points on a mesh that stand for its surface. The arrays are views of the set's own memory.")
         .def_prop_ro(
-            "positions", [](PointSet& p) { return view(&raw(p.positions)->x, {p.size(), 3}, nb::find(p)); },
+            "positions",
+            [](PointSet& p) {
+                return view(&raw(p.positions)->x, {p.size(), 3}, nb::find(p));
+            },
             "(N, 3) float32, metres.")
         .def_prop_ro(
-            "normals", [](PointSet& p) { return view(&raw(p.normals)->x, {p.size(), 3}, nb::find(p)); },
+            "normals",
+            [](PointSet& p) {
+                return view(&raw(p.normals)->x, {p.size(), 3}, nb::find(p));
+            },
             "(N, 3) float32: the triangles' geometric normals, unit length.")
         .def_prop_ro(
             "areas", [](PointSet& p) { return view(raw(p.areas), {p.size()}, nb::find(p)); },
@@ -50,7 +56,10 @@ void bind_points(nb::module_& module) {
             "triangles", [](PointSet& p) { return view(raw(p.triangles), {p.size()}, nb::find(p)); },
             "(N,) int32: the triangle that each point lies on.")
         .def_prop_ro(
-            "barycentrics", [](PointSet& p) { return view(&raw(p.barycentrics)->x, {p.size(), 2}, nb::find(p)); },
+            "barycentrics",
+            [](PointSet& p) {
+                return view(&raw(p.barycentrics)->x, {p.size(), 2}, nb::find(p));
+            },
             "(N, 2) float32 in [0, 1]: the weights of the triangle's second and third corner.")
         .def_prop_ro(
             "triangle_areas", [](PointSet& p) { return view(raw(p.triangle_areas), {p.size()}, nb::find(p)); },
@@ -79,10 +88,12 @@ void bind_points(nb::module_& module) {
                 return points_on(points, mesh);
             },
             "mesh"_a,
-            "The same points, with the same ids, on another pose of the mesh that they were made on: positions, normals\n"
+            "The same points, with the same ids, on another pose of the mesh that they were made on: positions, "
+            "normals\n"
             "and areas follow their triangles. ValueError where the pose has fewer triangles.")
         .def("__len__", &PointSet::size)
-        .def("__repr__", [](const PointSet& p) { return str("PointSet(", p.size(), " points, spacing ", p.spacing, ")"); });
+        .def("__repr__",
+             [](const PointSet& p) { return str("PointSet(", p.size(), " points, spacing ", p.spacing, ")"); });
 
     const auto place = [&](const char* name, auto make) {
         module.def(name, make, "mesh"_a, "spacing"_a, "seed"_a = 0, "thin_walls"_a = true, "max_points"_a = 0,
@@ -93,23 +104,26 @@ void bind_points(nb::module_& module) {
                                         std::uint64_t max_points, int threads, const MaybeCall& progress) {
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
-        return with_threads(threads,
-                            [&] { return poisson_points(mesh, spacing, {seed, thin_walls, max_points}, &told); });
+        return with_threads(threads, [&] {
+            return poisson_points(mesh, spacing, {seed, thin_walls, max_points}, &told);
+        });
     });
     place("poisson_points_varying", [](const Mesh& mesh, const FloatArray& spacing, std::uint32_t seed, bool thin_walls,
                                        std::uint64_t max_points, int threads, const MaybeCall& progress) {
         const std::vector<float> values(spacing.data(), spacing.data() + spacing.size());
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
-        return with_threads(threads,
-                            [&] { return poisson_points(mesh, values, {seed, thin_walls, max_points}, &told); });
+        return with_threads(threads, [&] {
+            return poisson_points(mesh, values, {seed, thin_walls, max_points}, &told);
+        });
     });
     place("poisson_points_by_count", [](const Mesh& mesh, std::uint64_t count, std::uint32_t seed, bool thin_walls,
                                         std::uint64_t max_points, int threads, const MaybeCall& progress) {
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
-        return with_threads(
-            threads, [&] { return poisson_points_by_count(mesh, count, {seed, thin_walls, max_points}, &told); });
+        return with_threads(threads, [&] {
+            return poisson_points_by_count(mesh, count, {seed, thin_walls, max_points}, &told);
+        });
     });
     nb::class_<PointStatistics>(module, "PointStatistics", "How good a point set is; distances in metres.")
         .def_ro("count", &PointStatistics::count)
@@ -131,7 +145,8 @@ void bind_points(nb::module_& module) {
             return point_statistics(points, mesh, thin_walls, samples);
         },
         "points"_a, "mesh"_a, "thin_walls"_a = true, "samples"_a = 0,
-        "Measure a point set: nearest pair, largest gap over `samples` places of the surface (0: ten a point, at least\n"
+        "Measure a point set: nearest pair, largest gap over `samples` places of the surface (0: ten a point, at "
+        "least\n"
         "100,000), spread of nearest distances and of areas.");
     module.def(
         "tessellated_points",

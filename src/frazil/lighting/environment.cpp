@@ -12,15 +12,29 @@ float weight_of(const Rgb& c) {
     return 0.2126f * std::abs(c.x) + 0.7152f * std::abs(c.y) + 0.0722f * std::abs(c.z);
 }
 
-// The interval of a cdf of `count` bins that holds u: its probability is never 0.
-int find_bin(const float* cdf, int count, float u) {
-    // The last edge that is <= u, without branches to mispredict.
-    int bin = 0, length = count;
+// A search begins in one of so many equal intervals of u, whose first bin is known.
+constexpr int kGuides = 256;
+
+// The last bin of cdf[first .. last] whose lower edge is <= u, without branches to mispredict.
+int find_bin(const float* cdf, int first, int last, float u) {
+    int bin = first, length = last - first + 1;
     while (length > 1) {
         const int half = length / 2;
         bin += cdf[bin + half] <= u ? half : 0;
         length -= half;
     }
+    return bin;
+}
+
+void make_guide(const float* cdf, int count, std::uint32_t* guide) {
+    for (int k = 0; k < kGuides; ++k) guide[k] = std::uint32_t(find_bin(cdf, 0, count - 1, float(k) / kGuides));
+    guide[kGuides] = std::uint32_t(count - 1);
+}
+
+// The bin that holds u: its probability is never 0.
+int find_bin(const float* cdf, const std::uint32_t* guide, float u) {
+    const int k = std::min(int(u * kGuides), kGuides - 1);
+    int bin = find_bin(cdf, int(guide[k]), int(guide[k + 1]), u);
     while (bin > 0 && cdf[bin + 1] == cdf[bin]) --bin;
     return bin;
 }
@@ -69,6 +83,7 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
 
     // One distribution per row over the mean of the corners' luminance.
     conditional_cdf_.resize(rows * (w + 1));
+    guides_.resize((rows + 1) * (kGuides + 1));
     std::vector<double> row_weight(rows);
     std::vector<V3d> row_sum(rows, V3d(0.0));
     parallel_for(rows, 16, [&](std::size_t begin, std::size_t end) {
@@ -82,6 +97,7 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
             }
             for (std::size_t x = 0; x < w; ++x) cell[x] = 0.25 * (column[x] + column[x + 1 == w ? 0 : x + 1]);
             row_weight[y] = finish_cdf(&conditional_cdf_[y * (w + 1)], width, cell);
+            make_guide(&conditional_cdf_[y * (w + 1)], width, &guides_[y * (kGuides + 1)]);
         }
     });
     V3d average(0.0);
@@ -100,6 +116,7 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
     }
     marginal_cdf_.resize(rows + 1);
     finish_cdf(marginal_cdf_.data(), int(rows), row_weight);
+    make_guide(marginal_cdf_.data(), int(rows), &guides_[rows * (kGuides + 1)]);
 }
 
 void Environment::set_corners(Cell& cell) const {
@@ -159,9 +176,10 @@ float Environment::pdf(const V3f& direction) const {
 
 V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
     Cell cell;
-    cell.row = find_bin(marginal_cdf_.data(), height_ + 1, u.y);
+    const auto guide_of = [&](int row) { return &guides_[std::size_t(row) * (kGuides + 1)]; };
+    cell.row = find_bin(marginal_cdf_.data(), guide_of(height_ + 1), u.y);
     const float* cdf = &conditional_cdf_[std::size_t(cell.row) * (std::size_t(width_) + 1)];
-    cell.column = find_bin(cdf, width_, u.x);
+    cell.column = find_bin(cdf, guide_of(cell.row), u.x);
     set_corners(cell);
     // What is left of u within its bin becomes the place within the cell, by the slope between its corners.
     const auto rest = [](const float* bins, int bin, float value) {

@@ -4,7 +4,8 @@
 // Units: radiance; directions in the light's own frame: row 0 is +y, the centre of the image +z, and +x lies left of the
 //   centre (OpenEXR's latitude-longitude map, which UsdLuxDomeLight follows).
 // Valid: any image of finite pixels, at least 1 x 1; negative ones subtract; a black one samples uniformly. pdf() is
-//   exact for sample() and nowhere 0 where there is light. Memory: 16 bytes a pixel.
+//   exact for sample() and nowhere 0 where there is light. Memory: 16 bytes a pixel,
+//   1 KiB a row.
 // Not: mip-maps.
 #pragma once
 
@@ -51,8 +52,9 @@ class Environment {
     int width_, height_;
     std::vector<Rgb> pixels_;
     std::vector<float> marginal_cdf_, conditional_cdf_;  // height + 2; height + 1 rows of width + 1
-    std::vector<float> row_cosine_;  // cos(theta) at the upper edge of each row of cells; height + 2
-    float integral_ = 0.0f;          // of the absolute luminance over the sphere
+    std::vector<std::uint32_t> guides_;  // where a search in each conditional row, then the marginal, begins
+    std::vector<float> row_cosine_;      // cos(theta) at the upper edge of each row of cells; height + 2
+    float integral_ = 0.0f;              // of the absolute luminance over the sphere
     Rgb average_;
 };
 

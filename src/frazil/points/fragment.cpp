@@ -55,8 +55,8 @@ void append_fragments(const Mesh& mesh, const SpacingField& spacing, const TileF
     ClipPolygon<Corner> polygon;
     for (int k = 0; k < 3; ++k) {
         const std::int32_t vertex = mesh.triangles[triangle][k];
-        polygon.push({frame.to_local(mesh.positions[vertex]), V2d(k == 1, k == 2),
-                      spacing.at_vertex(vertex) / frame.unit});
+        polygon.push(
+            {frame.to_local(mesh.positions[vertex]), V2d(k == 1, k == 2), spacing.at_vertex(vertex) / frame.unit});
     }
     for (int axis = 0; axis < 3; ++axis) {
         polygon.clip([&](const Corner& corner) { return -corner.position[axis]; }, mix);

@@ -16,7 +16,8 @@ constexpr double kLongestEdge = 3.0;  // of a fragment, in spacings: larger ones
 // Sums that do not depend on the order of their terms.
 class FixedPointSums {
   public:
-    FixedPointSums(std::size_t count, double total) : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
+    FixedPointSums(std::size_t count, double total)
+        : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
 
     void add(std::size_t index, double value) {
         std::atomic_ref<std::int64_t>(sums_[index])
@@ -73,15 +74,21 @@ class TileSharer {
         float extent2 = 0.0f;
         for (const V3f& corner : f.corners) extent2 = std::max(extent2, (corner - centroid).length2());
         const float reach = fragment_reach(f);
-        candidates_.clear();
-        points_.clear();
-        double surely = 1e30;  // some point is nearer than this to all of the fragment
+        hits_.clear();
+        float least2 = 1e30f;
         near_.any_near(centroid, f.normal, reach * reach, [&](std::uint32_t p) {
-            push_candidate(f, p);
-            const double* d = candidates_.back().d;
-            surely = std::min(surely, std::max(d[0], std::max(d[1], d[2])));
+            const float d2 = (near_.locals[p] - centroid).length2();
+            least2 = std::min(least2, d2);
+            hits_.push_back({p, d2});
             return false;
         });
+        // Leave out who is farther from any of the fragment than the centroid's nearest is from all of it.
+        const float farthest = (std::sqrt(least2) + 2.0f * std::sqrt(extent2)) * 1.0001f;
+        candidates_.clear();
+        points_.clear();
+        for (const Hit& hit : hits_) {
+            if (hit.distance2 <= farthest * farthest) push_candidate(f, hit.point);
+        }
         if (candidates_.empty()) {
             // Only where floats are too coarse to place a point: the nearest there is takes it.
             std::uint32_t best = 0;
@@ -92,17 +99,10 @@ class TileSharer {
             return;
         }
 
-        // Leave out who is farther from all of the fragment than another point is from any of it.
-        const double farthest = std::sqrt(surely) * 1.0001 + std::sqrt(double(extent2));
-        std::size_t left = 0;
-        for (std::size_t i = 0; i < candidates_.size(); ++i) {
-            if ((near_.locals[points_[i]] - centroid).length2() > farthest * farthest) continue;
-            candidates_[left] = candidates_[i];
-            points_[left++] = points_[i];
+        if (candidates_.size() == 1) {
+            areas.add(indices_[points_[0]], area);
+            return;
         }
-        candidates_.resize(left);
-        points_.resize(left);
-
         const int count = static_cast<int>(candidates_.size());
         int nearest[3];
         find_nearest(candidates_.data(), count, nearest);
@@ -112,6 +112,12 @@ class TileSharer {
             return;
         }
         drop_dominated(candidates_.data(), count, nearest, kept_);
+        // The nearest first: they cut most, and the parts of far ones are soon seen to be empty.
+        std::sort(kept_.begin(), kept_.end(), [&](int a, int b) {
+            const double *p = candidates_[a].d, *q = candidates_[b].d;
+            const double near_a = p[0] + p[1] + p[2], near_b = q[0] + q[1] + q[2];
+            return near_a != near_b ? near_a < near_b : a < b;
+        });
         shares_.clear();
         double total = 0.0;
         for (std::size_t i = 0; i + 1 < kept_.size(); ++i) {
@@ -128,8 +134,8 @@ class TileSharer {
 
     void push_candidate(const Fragment& f, std::uint32_t p) {
         const V3f& place = near_.locals[p];
-        candidates_.push_back({{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(),
-                                (f.corners[2] - place).length2()}});
+        candidates_.push_back(
+            {{(f.corners[0] - place).length2(), (f.corners[1] - place).length2(), (f.corners[2] - place).length2()}});
         points_.push_back(p);
     }
 
@@ -139,6 +145,11 @@ class TileSharer {
     std::vector<Fragment> fragments_;
     Neighbourhood near_;
     std::vector<std::size_t> indices_;  // of each point in near_, in the whole set
+    struct Hit {
+        std::uint32_t point;
+        float distance2;
+    };
+    std::vector<Hit> hits_;
     std::vector<CornerDistances> candidates_;
     std::vector<std::uint32_t> points_;
     std::vector<int> kept_;
@@ -148,8 +159,7 @@ class TileSharer {
 }  // namespace
 
 std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, double unit,
-                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts,
-                                 Progress* progress) {
+                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts, Progress* progress) {
     std::vector<std::size_t> first(grid.count() + 1, 0);
     for (std::size_t i = 0; i < grid.count(); ++i) first[i + 1] = first[i] + darts[i].size();
     FixedPointSums sums(first.back(), surface_area(mesh));
@@ -159,8 +169,7 @@ std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, 
     parallel_for(grid.count(), kTileGrain, [&](std::size_t begin, std::size_t end) {
         TileSharer& sharer = sharers.local();
         for (std::size_t tile = begin; tile < end; ++tile) {
-            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, darts, first,
-                         sums);
+            sharer.share({grid.tile_origin(tile), unit, grid.size / unit}, grid, tile, darts, first, sums);
         }
         if (progress) progress->update("areas", double(done += end - begin) / double(grid.count()));
     });

@@ -17,7 +17,6 @@ namespace frazil {
 
 // darts[tile] are the points of each tile; the result is in that order, tile after tile. `unit` is the reference spacing.
 std::vector<float> nearest_areas(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, double unit,
-                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts,
-                                 Progress* progress);
+                                 bool thin_walls, const std::vector<std::vector<Dart>>& darts, Progress* progress);
 
 }  // namespace frazil

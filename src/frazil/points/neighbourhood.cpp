@@ -52,7 +52,8 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
     }
     // The distance from the point to a slab of cells; end cells reach outwards without end.
     const auto gap = [&](int cell, int axis) {
-        const float low = cell == 0 ? -1e30f : cell * width_, high = cell + 1 == int(cells_) ? 1e30f : (cell + 1) * width_;
+        const float low = cell == 0 ? -1e30f : cell * width_,
+                    high = cell + 1 == int(cells_) ? 1e30f : (cell + 1) * width_;
         return std::max(0.0f, std::max(low - local[axis], local[axis] - high));
     };
     const float reach2 = reach_ * reach_ * 1.0001f + 1e-6f;
@@ -63,7 +64,7 @@ std::uint32_t Neighbourhood::add(const V3f& local, const V3f& normal, const V3f&
             if (row == 0) continue;
             const float dy = gap(y, 1);
             for (; row != 0; row &= row - 1) {
-                const int x = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(row));
+                const int x = std::countr_zero(row);
                 const std::size_t cell = (z * cells_ + y) * cells_ + x;
                 const float dx = gap(x, 0);
                 if (dx * dx + dy * dy + dz * dz > reach2) continue;

@@ -6,10 +6,13 @@
 // Not: removal.
 #pragma once
 
-#include <hwy/highway.h>
-
+#include <bit>
 #include <cstdint>
 #include <vector>
+
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include "frazil/base/vec.h"
 
@@ -33,27 +36,10 @@ class Neighbourhood {
     // (no more than `reach`²); ends where visit returns true, and says so.
     template <class Visit>
     bool any_near(const V3f& place, const V3f& normal, float distance2, const Visit& visit) const {
-        namespace hn = hwy::HWY_NAMESPACE;
-        const hn::CappedTag<float, kLanes> tag;
-        const auto x = hn::Set(tag, place.x), y = hn::Set(tag, place.y), z = hn::Set(tag, place.z);
-        const auto nx = hn::Set(tag, normal.x), ny = hn::Set(tag, normal.y), nz = hn::Set(tag, normal.z);
-        const auto limit = hn::Set(tag, distance2), cosine = hn::Set(tag, least_cosine_);
         for (std::int32_t chunk = heads_[cell_of(place)]; chunk >= 0; chunk = chunks_[chunk].next) {
             const Chunk& list = chunks_[chunk];
-            for (std::size_t lane = 0; lane < kLanes; lane += hn::Lanes(tag)) {
-                const auto dx = hn::Sub(hn::Load(tag, list.x + lane), x);
-                const auto dy = hn::Sub(hn::Load(tag, list.y + lane), y);
-                const auto dz = hn::Sub(hn::Load(tag, list.z + lane), z);
-                const auto d2 = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
-                // In the order of is_same_side, so that both decide alike.
-                const auto dot = hn::Add(hn::Add(hn::Mul(hn::Load(tag, list.nx + lane), nx),
-                                                 hn::Mul(hn::Load(tag, list.ny + lane), ny)),
-                                         hn::Mul(hn::Load(tag, list.nz + lane), nz));
-                std::uint8_t bytes[8] = {};
-                hn::StoreMaskBits(tag, hn::And(hn::Le(d2, limit), hn::Gt(dot, cosine)), bytes);
-                for (unsigned bits = bytes[0]; bits != 0; bits &= bits - 1) {
-                    if (visit(list.points[lane + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits)])) return true;
-                }
+            for (unsigned bits = seen(list, place, normal, distance2); bits != 0; bits &= bits - 1) {
+                if (visit(list.points[std::countr_zero(bits)])) return true;
             }
         }
         return false;
@@ -72,7 +58,39 @@ class Neighbourhood {
         std::int32_t count;
     };
 
-    int cell_along(float place) const { return static_cast<int>(std::clamp(place * scale_, 0.0f, last_cell_)); }
+    // A bit for each lane that lies near enough and on the side of the normal; the dot product is summed in the order of
+    // is_same_side, so that both decide alike.
+    unsigned seen(const Chunk& list, const V3f& place, const V3f& normal, float distance2) const {
+#if defined(__SSE2__)
+        const __m128 x = _mm_set1_ps(place.x), y = _mm_set1_ps(place.y), z = _mm_set1_ps(place.z);
+        const __m128 nx = _mm_set1_ps(normal.x), ny = _mm_set1_ps(normal.y), nz = _mm_set1_ps(normal.z);
+        const __m128 limit = _mm_set1_ps(distance2), cosine = _mm_set1_ps(least_cosine_);
+        unsigned bits = 0;
+        for (int lane = 0; lane < list.count; lane += 4) {
+            const __m128 dx = _mm_sub_ps(_mm_load_ps(list.x + lane), x), dy = _mm_sub_ps(_mm_load_ps(list.y + lane), y),
+                         dz = _mm_sub_ps(_mm_load_ps(list.z + lane), z);
+            const __m128 d2 = _mm_add_ps(_mm_add_ps(_mm_mul_ps(dx, dx), _mm_mul_ps(dy, dy)), _mm_mul_ps(dz, dz));
+            const __m128 dot = _mm_add_ps(
+                _mm_add_ps(_mm_mul_ps(_mm_load_ps(list.nx + lane), nx), _mm_mul_ps(_mm_load_ps(list.ny + lane), ny)),
+                _mm_mul_ps(_mm_load_ps(list.nz + lane), nz));
+            const __m128 is_seen = _mm_and_ps(_mm_cmple_ps(d2, limit), _mm_cmpgt_ps(dot, cosine));
+            bits |= unsigned(_mm_movemask_ps(is_seen)) << lane;
+        }
+        return bits;
+#else
+        unsigned bits = 0;
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const float dx = list.x[i] - place.x, dy = list.y[i] - place.y, dz = list.z[i] - place.z;
+            const float dot = list.nx[i] * normal.x + list.ny[i] * normal.y + list.nz[i] * normal.z;
+            bits |= unsigned((dx * dx + dy * dy + dz * dz <= distance2) & (dot > least_cosine_)) << i;
+        }
+        return bits;
+#endif
+    }
+
+    int cell_along(float place) const {
+        return static_cast<int>(std::clamp(place * scale_, 0.0f, last_cell_));
+    }
     std::size_t cell_of(const V3f& place) const {
         return (std::size_t(cell_along(place.z)) * cells_ + cell_along(place.y)) * cells_ + cell_along(place.x);
     }

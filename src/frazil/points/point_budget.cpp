@@ -41,8 +41,9 @@ void check_budget(double points, std::uint64_t max_points, const char* name, dou
     if (points <= limit) return;
     // Rounded up, so that the remedy as printed is enough.
     throw ValueError(str("Mesh: ", name, " must be >= ", value * std::sqrt(points / limit) * 1.01, ", got ", value,
-                         ". It would take about ", points, " points and ", points * kBytesPerPoint / 1e9,
-                         " GB, and ", limit, " points are allowed", max_points > 0 ? " by max_points." : " by the memory that is free."));
+                         ". It would take about ", points, " points and ", points * kBytesPerPoint / 1e9, " GB, and ",
+                         limit, " points are allowed",
+                         max_points > 0 ? " by max_points." : " by the memory that is free."));
 }
 
 }  // namespace frazil

@@ -33,9 +33,8 @@ PointSet points_on(const PointSet& points, const Mesh& pose) {
             const std::int32_t triangle = points.triangles[i];
             const V3i& t = pose.triangles[triangle];
             const V2f& uv = points.barycentrics[i];
-            moved.positions[i] =
-                V3f(V3d(pose.positions[t.x]) * (1.0 - uv.x - uv.y) + V3d(pose.positions[t.y]) * double(uv.x) +
-                    V3d(pose.positions[t.z]) * double(uv.y));
+            moved.positions[i] = V3f(V3d(pose.positions[t.x]) * (1.0 - uv.x - uv.y) +
+                                     V3d(pose.positions[t.y]) * double(uv.x) + V3d(pose.positions[t.z]) * double(uv.y));
             moved.normals[i] = unit_normal(pose, triangle);
             moved.triangle_areas[i] = static_cast<float>(0.5 * triangle_cross(pose, triangle).length());
             if (points.triangle_areas[i] > 0.0f) {

@@ -16,7 +16,8 @@
 namespace frazil {
 namespace {
 
-constexpr double kTileWidth = 12.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
+constexpr double kTileWidth =
+    12.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
 constexpr std::size_t kTriangleGrain = 4096;
 
 // The area, and the integral of 1 / spacing² over it, which tells the number of points.
@@ -38,8 +39,8 @@ Extent measure(const Mesh& mesh, const SpacingField& spacing) {
             const double a = spacing.at_vertex(t.x), b = spacing.at_vertex(t.y), c = spacing.at_vertex(t.z);
             // Exact for constant spacing, the mean of 1/r² over corners and centre otherwise.
             const double m = (a + b + c) / 3.0;
-            const double mean = spacing.per_vertex ? 0.75 / (m * m) + (1 / (a * a) + 1 / (b * b) + 1 / (c * c)) / 12.0
-                                                   : 1.0 / (a * a);
+            const double mean =
+                spacing.per_vertex ? 0.75 / (m * m) + (1 / (a * a) + 1 / (b * b) + 1 / (c * c)) / 12.0 : 1.0 / (a * a);
             sum += {area, area * mean};
         }
         return sum;
@@ -59,8 +60,7 @@ PointSet assemble(const Mesh& mesh, std::vector<std::vector<Dart>>& darts, std::
                 points.positions[at] = dart.position;
                 points.normals[at] = dart.normal;
                 points.triangles[at] = dart.triangle;
-                points.triangle_areas[at] =
-                    static_cast<float>(0.5 * triangle_cross(mesh, dart.triangle).length());
+                points.triangle_areas[at] = static_cast<float>(0.5 * triangle_cross(mesh, dart.triangle).length());
                 points.barycentrics[at++] = dart.uv;
             }
             std::vector<Dart>().swap(darts[tile]);
@@ -137,8 +137,8 @@ Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, cons
 }
 
 PointSet finish(const Mesh& mesh, Placed& placed, double spacing, bool thin_walls, Progress* progress) {
-    std::vector<float> areas = nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls,
-                                             placed.darts, progress);
+    std::vector<float> areas =
+        nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls, placed.darts, progress);
     PointSet points = assemble(mesh, placed.darts, std::move(areas));
     points.spacing = spacing;
     return points;
@@ -165,8 +165,8 @@ PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spaci
     for (std::size_t i = 0; i < vertex_spacing.size(); ++i) {
         const float r = vertex_spacing[i];
         if (!(r > 0.0f) || !std::isfinite(r)) {
-            throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", r, " at vertex ", i,
-                                 ". It is in metres."));
+            throw ValueError(
+                str("poisson_points: spacing must be > 0 and finite, got ", r, " at vertex ", i, ". It is in metres."));
         }
         largest = std::max<double>(largest, r);
     }

@@ -59,9 +59,11 @@ class NearestPoint {
         if (end - begin == 1) return;
         const double side = offset[axes_[middle]];
         const bool is_below = side < 0.0;
-        is_below ? search(begin, middle, place, normal, self, best2) : search(middle + 1, end, place, normal, self, best2);
+        is_below ? search(begin, middle, place, normal, self, best2)
+                 : search(middle + 1, end, place, normal, self, best2);
         if (side * side >= best2) return;
-        is_below ? search(middle + 1, end, place, normal, self, best2) : search(begin, middle, place, normal, self, best2);
+        is_below ? search(middle + 1, end, place, normal, self, best2)
+                 : search(begin, middle, place, normal, self, best2);
     }
 
     const PointSet& points_;
@@ -128,8 +130,8 @@ PointStatistics point_statistics(const PointSet& points, const Mesh& mesh, bool 
                 v = 1.0 - v;
             }
             const V3i& t = mesh.triangles[triangle];
-            const V3d place = V3d(mesh.positions[t.x]) * (1.0 - u - v) + V3d(mesh.positions[t.y]) * u +
-                              V3d(mesh.positions[t.z]) * v;
+            const V3d place =
+                V3d(mesh.positions[t.x]) * (1.0 - u - v) + V3d(mesh.positions[t.y]) * u + V3d(mesh.positions[t.z]) * v;
             gaps[begin / kGrain] = std::max(gaps[begin / kGrain], nearest.distance(place, normal));
         }
     });

@@ -6,11 +6,11 @@
 namespace frazil {
 namespace {
 
-constexpr double kLongestEdge = 1.5;          // of a fragment, in spacings
-constexpr double kUniformDarts = 3.0;         // per spacing² of surface, before fragments are taken one by one
-constexpr float kLeafEdge = 1.0f / 32.0f;     // of the spacing: below it a part is closed exactly
-constexpr float kSafe = 1.0f - 2e-5f;         // float distances err by less than this
-constexpr double kGapTolerance = 1e-9;        // of the spacing
+constexpr double kLongestEdge = 1.5;       // of a fragment, in spacings
+constexpr double kUniformDarts = 3.0;      // per spacing² of surface, before fragments are taken one by one
+constexpr float kLeafEdge = 1.0f / 32.0f;  // of the spacing: below it a part is closed exactly
+constexpr float kSafe = 1.0f - 2e-5f;      // float distances err by less than this
+constexpr double kGapTolerance = 1e-9;     // of the spacing
 constexpr int kMostLanes = 32;
 
 }  // namespace
@@ -18,8 +18,8 @@ constexpr int kMostLanes = 32;
 // A part of a fragment and its squared distances to the points around it, a lane per point.
 struct TileFiller::Node {
     alignas(32) float d[3][kMostLanes];
-    V2f place[3];      // barycentrics in the fragment
-    float edge2[3];    // squared lengths of 01, 12, 20
+    V2f place[3];    // barycentrics in the fragment
+    float edge2[3];  // squared lengths of 01, 12, 20
     float radius[3];
     int lanes;
 
@@ -149,7 +149,8 @@ void TileFiller::throw_darts() {
         }
         const V3f place = fragment.corners[0] * (1.0f - u - v) + fragment.corners[1] * u + fragment.corners[2] * v;
         const float r = fragment.radii[0] * (1.0f - u - v) + fragment.radii[1] * u + fragment.radii[2] * v;
-        if (!near_.any_near(place, fragment.normal, r * r * kSafe, [](std::uint32_t) { return true; })) try_place(fragment, u, v, false);
+        if (!near_.any_near(place, fragment.normal, r * r * kSafe, [](std::uint32_t) { return true; }))
+            try_place(fragment, u, v, false);
     }
 }
 
@@ -241,8 +242,8 @@ TileFiller::Outcome TileFiller::close_gap(const Fragment& f, const Node& node) {
     candidates_.clear();
     near_.any_near(V3f(centroid), f.normal, float(reach * reach), [&](std::uint32_t p) {
         const V3d place = frame_.to_local(near_.worlds[p]);
-        candidates_.push_back({{(corners[0] - place).length2(), (corners[1] - place).length2(),
-                                (corners[2] - place).length2()}});
+        candidates_.push_back(
+            {{(corners[0] - place).length2(), (corners[1] - place).length2(), (corners[2] - place).length2()}});
         return false;
     });
 
@@ -310,9 +311,8 @@ bool TileFiller::is_free(const V3f& world, const V3f& near, const V3f& normal, d
     const V3d place(world);
     // Look a little farther than the spacing, by what rounding may have moved the place.
     const float seen = float(radius / frame_.unit) * 1.005f + float((frame_.to_local(world) - V3d(near)).length());
-    return !near_.any_near(near, normal, seen * seen, [&](std::uint32_t p) {
-        return (V3d(near_.worlds[p]) - place).length2() < radius * radius;
-    });
+    return !near_.any_near(near, normal, seen * seen,
+                           [&](std::uint32_t p) { return (V3d(near_.worlds[p]) - place).length2() < radius * radius; });
 }
 
 }  // namespace frazil

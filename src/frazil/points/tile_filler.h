@@ -36,7 +36,7 @@ inline float fragment_reach(const Fragment& f) {
     return (radius * 1.01f + std::sqrt(extent2)) * 1.001f;
 }
 
-inline constexpr double kCellWidth = 0.8;  // of the cells of points, beside the reach of look-ups
+inline constexpr double kCellWidth = 1.2;  // of the cells of points, beside the reach of look-ups
 
 class TileFiller {
   public:

@@ -17,9 +17,7 @@ constexpr std::size_t kTriangleGrain = 4096;
 struct Pair {
     std::uint64_t key;
     std::int32_t triangle;
-    bool operator<(const Pair& other) const {
-        return key != other.key ? key < other.key : triangle < other.triangle;
-    }
+    bool operator<(const Pair& other) const { return key != other.key ? key < other.key : triangle < other.triangle; }
 };
 
 std::uint64_t spread_bits(std::uint64_t x) {
@@ -139,8 +137,7 @@ TileGrid make_tile_grid(const Mesh& mesh, double tile_size, std::uint64_t max_pa
             if (unit_normal(mesh, i) == V3f(0.0f)) continue;
             TriangleTiler::Polygon polygon;
             for (int k = 0; k < 3; ++k) polygon.push(V3d(mesh.positions[mesh.triangles[i][k]]));
-            TriangleTiler{grid, std::int32_t(i), pairs, max_pairs}.visit(polygon, V3i(0),
-                                                                                V3i((1 << kAxisBits) - 1));
+            TriangleTiler{grid, std::int32_t(i), pairs, max_pairs}.visit(polygon, V3i(0), V3i((1 << kAxisBits) - 1));
         }
     });
 
