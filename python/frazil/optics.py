@@ -2,7 +2,7 @@
 
 Absorption tables are per metre from 350 to 750 nm in steps of 10 nm:
 
-- ``warren2008``: 4 pi k / wavelength from the imaginary index k of [WarrenBrandt2008], its table at the same wavelengths.
+- ``warren2008``: 4 pi k / wavelength from the imaginary index k of [WarrenBrandt2008] at these wavelengths.
 - ``picard2016``: [Picard2016] below 600 nm as the authors' package snowoptics 0.99.2 holds it (its values lie 6-7 %
   under the table on the authors' page), and [WarrenBrandt2008] above. In the blue it absorbs ten times as much.
 
@@ -100,7 +100,7 @@ def impurity_absorption(kind: str, mass_fraction: float) -> np.ndarray:
         raise ValueError(f"impurity_absorption: kind must be one of {', '.join(_IMPURITIES)}, got {kind!r}.")
     if not (mass_fraction >= 0 and np.isfinite(mass_fraction)):
         raise ValueError(
-            f"impurity_absorption: mass_fraction must be >= 0, got {mass_fraction}. It is kg per kg of ice."
+            f"impurity_absorption: mass_fraction must be >= 0, got {mass_fraction}. It is kg per kg."
         )
     per_mass, at_nm, exponent = _IMPURITIES[kind]
     return mass_fraction * ICE_DENSITY * per_mass * (WAVELENGTHS_NM / at_nm) ** -exponent

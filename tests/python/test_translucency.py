@@ -105,7 +105,7 @@ def test_same_bits_alone_and_among_threads():
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_white_furnace(estimator):
-    """Nothing absorbed, light 1 from all around: 1 everywhere with `conserve`, on the tip of a spire as in the valley."""
+    """Nothing absorbed, light 1 from all around: 1 everywhere with `conserve`, on the tip of a spire too."""
     profile = fz.Dipole(fz.Medium(20.0, 0.0, eta=1.31))
     points = cone(0.15, 150, 1e-3, 3.0)
     tree = fz.PointTree(points, np.ones((len(points.areas), 3)), profile)

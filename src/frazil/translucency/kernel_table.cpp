@@ -28,13 +28,13 @@ std::array<double, kN> fit(const Function& f) {
     return power;
 }
 
-// The distance beyond which r² Rd is less than 1e-9 of the albedo in every channel, at most 2^15 z0.
+// The distance beyond which r² Rd is less than 1e-7 of the albedo in every channel, at most 2^15 z0.
 double reach_of(const Profile& profile, double z0) {
     double reach = z0;
     for (; reach < 32768.0 * z0; reach *= 1.1) {
         bool is_dark = true;
         for (int c = 0; c < 3; ++c) {
-            is_dark = is_dark && reach * reach * reflectance(profile, c, reach) <= 1e-9 * albedo(profile, c);
+            is_dark = is_dark && reach * reach * reflectance(profile, c, reach) <= 1e-7 * albedo(profile, c);
         }
         if (is_dark) break;
     }
@@ -49,7 +49,7 @@ KernelTable tabulate(const Profile& profile) {
     for (int c = 1; c < 3; ++c) z0 = std::min(z0, mean_free_path(profile, c));
     const double wanted = reach_of(profile, z0);
     const double octaves = std::log2(1.0 + wanted * wanted / (z0 * z0));
-    table.split = octaves <= 16.0 ? 1 : 0;
+    table.split = 2.0 * octaves <= KernelTable::kSegments - 1 ? 1 : 0;
     const int pieces = 1 << table.split;
     const int used = std::min(KernelTable::kSegments - 1, static_cast<int>(std::ceil(octaves * pieces)));
     table.inverse_z0_squared = static_cast<float>(1.0 / (z0 * z0));
