@@ -1,4 +1,4 @@
-"""Frazil against path-traced truth: relative RMS error per channel, mode by mode of the area compensation.
+"""Frazil against path-traced truth: relative RMS error per channel, by mode of the area compensation and number of bounces.
 
 A reference is an .npz with `radiance` (H, W, 3), `coverage` (H, W) and `params`, a JSON text: mesh, sigma_s_prime and
 sigma_a in 1/unit, env (radiance from all around), light [centre, target, half size, radiance], camera [origin, target],
@@ -8,6 +8,7 @@ fov in degrees across the width. The boundary is index-matched (eta = 1). Only p
 """
 
 import argparse
+import itertools
 import json
 import time
 from pathlib import Path
@@ -66,6 +67,7 @@ def main() -> None:
     parser.add_argument("mesh", type=Path, help="the mesh that it shows")
     parser.add_argument("--samples", type=int, default=16, help="camera samples per pixel (default 16)")
     parser.add_argument("--bake-samples", type=int, default=256, help="shadow rays per point and light (default 256)")
+    parser.add_argument("--bounces", type=int, nargs="+", default=[0, 1, 5], help="bake bounces (default 0 1 5)")
     parser.add_argument("--out", type=Path, help="folder for an EXR per mode (default: none is written)")
     args = parser.parse_args()
 
@@ -74,25 +76,26 @@ def main() -> None:
     truth, inside = reference["radiance"], reference["coverage"] == 1
     height, width = inside.shape
     print(f"{args.reference.stem}: {inside.sum()} pixels compared")
-    print("| compensation | RMS R G B, % | truth / render R G B | points | seconds |\n|---|---|---|---|---|")
-    for mode in MODES:
+    print("| compensation | bounces | RMS R G B, % | truth / render R G B | points | seconds |\n|---|---|---|---|---|---|")
+    for mode, bounces in itertools.product(MODES, args.bounces):
         start = time.perf_counter()
         film = fz.render(
             reference_scene(params, args.mesh, mode),
             resolution=(width, height),
             samples=args.samples,
             bake_samples=args.bake_samples,
+            bake_bounces=bounces,
             pixel_filter="box",
         )
         seconds = time.perf_counter() - start
         rms, gain = compare(film["beauty"][..., :3], truth, inside)
         errors = " ".join(f"{100 * value:.1f}" for value in rms)
         gains = " ".join(f"{value:.2f}" for value in gain)
-        print(f"| {mode} | {errors} | {gains} | {film.stats['points']} | {seconds:.1f} |", flush=True)
+        print(f"| {mode} | {bounces} | {errors} | {gains} | {film.stats['points']} | {seconds:.1f} |", flush=True)
         if args.out:
             args.out.mkdir(parents=True, exist_ok=True)
-            film.save(args.out / f"{args.reference.stem}_{mode}.exr")
-            film.save_preview(args.out / f"{args.reference.stem}_{mode}.png")
+            film.save(args.out / f"{args.reference.stem}_{mode}_{bounces}.exr")
+            film.save_preview(args.out / f"{args.reference.stem}_{mode}_{bounces}.png")
 
 
 if __name__ == "__main__":

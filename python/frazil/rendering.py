@@ -36,6 +36,7 @@ def render(
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
     bake_samples: int = 64,
+    bake_bounces: int = 1,
     tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
@@ -62,7 +63,9 @@ def render(
     spacing_scale : float
         Multiplies every spacing, > 0.
     bake_samples : int
-        Shadow rays per point and light, 1 or more.
+        Shadow rays per point and light, 1 or more; a quarter as many look for bounced light.
+    bake_bounces : int
+        Of light that reaches the points by way of ice and diffuse surfaces, 0 or more.
     tolerance : float
         Relative error that clustering may make in a gather, > 0.
     estimator : str
@@ -103,6 +106,7 @@ def render(
         "spacing": spacing,
         "spacing_scale": spacing_scale,
         "bake_samples": bake_samples,
+        "bake_bounces": bake_bounces,
         "tolerance": tolerance,
         "estimator": estimator,
         "filter": pixel_filter,

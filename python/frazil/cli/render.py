@@ -71,6 +71,9 @@ def render_command(
     ] = 0.0,
     spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
     bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
+    bake_bounces: Annotated[
+        int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
+    ] = 1,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[
@@ -112,7 +115,8 @@ def render_command(
     _within("--threads", threads, 0, 4096)
     _within("--seed", seed, 0, 2**32 - 1)
     _within("--max-bounces", max_bounces, 0, 1024)
-    _within("--bake-samples", bake_samples, 1, 2**24)
+    _within("--bake-samples", bake_samples, 1, 2**20)
+    _within("--bake-bounces", bake_bounces, 0, 64)
     layers = _chosen_layers(aov)
     jobs = _jobs(output, png, no_png, frame, frames)
     _refuse_unreadable(scene)
@@ -132,6 +136,7 @@ def render_command(
         "spacing": spacing,
         "spacing_scale": spacing_scale,
         "bake_samples": bake_samples,
+        "bake_bounces": bake_bounces,
         "tolerance": tolerance,
         "estimator": estimator,
     }

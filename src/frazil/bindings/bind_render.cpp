@@ -56,7 +56,8 @@ nb::dict stats_of(const RenderStats& stats) {
 // Render without the GIL; take it back for each progress report, where Ctrl-C is seen too.
 RenderResult render_from_python(const Scene& scene, int width, int height, int samples, std::uint32_t seed, int threads,
                                 const std::string& filter, int max_bounces, float spacing, float spacing_scale,
-                                int bake_samples, float tolerance, const std::string& estimator, nb::object progress) {
+                                int bake_samples, int bake_bounces, float tolerance, const std::string& estimator,
+                                nb::object progress) {
     RenderOptions options;
     options.width = width;
     options.height = height;
@@ -68,6 +69,7 @@ RenderResult render_from_python(const Scene& scene, int width, int height, int s
     options.spacing = spacing;
     options.spacing_scale = spacing_scale;
     options.bake_samples = bake_samples;
+    options.bake_bounces = bake_bounces;
     options.gather = {tolerance, estimator_named(estimator)};
 
     // A Python error (Ctrl-C among them) stops the render and is raised once the threads are home.
@@ -114,8 +116,8 @@ void bind_render(nb::module_& module) {
     module.def("aov_table", &aov_rows, "The AOV table: a list of dicts (name, channels, meaning, filter, ...).");
     module.def("render", &render_from_python, "scene"_a, nb::kw_only(), "width"_a = 960, "height"_a = 540,
                "samples"_a = 32, "seed"_a = 0, "threads"_a = 0, "filter"_a = "blackman_harris", "max_bounces"_a = 4,
-               "spacing"_a = 0.0f, "spacing_scale"_a = 1.0f, "bake_samples"_a = 64, "tolerance"_a = 0.01f,
-               "estimator"_a = "noise_free", "progress"_a = nb::none(),
+               "spacing"_a = 0.0f, "spacing_scale"_a = 1.0f, "bake_samples"_a = 64, "bake_bounces"_a = 1,
+               "tolerance"_a = 0.01f, "estimator"_a = "noise_free", "progress"_a = nb::none(),
                "Render a scene; see frazil.render. progress(stage, fraction) is called now and then from any thread;\n"
                "an exception that it raises stops the render.");
 }

@@ -6,6 +6,7 @@
 #include "frazil/base/error.h"
 #include "frazil/points/point_budget.h"
 #include "frazil/points/poisson.h"
+#include "frazil/render/bounces.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -72,57 +73,71 @@ float point_spacing(const IceMaterial& material, double area, const RenderOption
     return spacing * options.spacing_scale;
 }
 
+float Body::transmittance(float cos_theta, float roughness) const {
+    return 1.0f - material->specular * boundary->eval(cos_theta, alpha_from_roughness(roughness));
+}
+
+float Body::transmittance_average(float roughness) const {
+    return 1.0f - material->specular * boundary->average(alpha_from_roughness(roughness));
+}
+
+Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
+    const float roughness = eval_float(material->roughness, surface.st);
+    const float leaving = transmittance(surface.normal.dot(wo), roughness) / transmittance_average(roughness);
+    return eval_color(material->tint, surface.st) * (material->translucency * kInvPi * leaving);
+}
+
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene, const RayScene& ray_scene,
                                                const LightSampler& lights, const RenderOptions& options,
                                                RenderStats& stats, Progress* progress) {
     std::vector<std::unique_ptr<Body>> bodies(scene.objects.size());
+    std::vector<LitPoints> lit(scene.objects.size());
     std::multimap<std::uint32_t, SharedPoints> shared;
     std::map<float, std::shared_ptr<const DielectricAlbedo>> boundaries;  // by eta
-    const std::vector<std::string> groups = light_groups(scene.lights);
 
+    // Points, and the light that reaches them straight from the lights.
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const Object& object = scene.objects[i];
         const auto* material = std::get_if<IceMaterial>(&scene.materials[object.material].model);
         if (!material) continue;
-        auto body = std::make_unique<Body>();
-        body->material = material;
         auto& boundary = boundaries[material->medium.eta];
         if (!boundary) boundary = std::make_shared<DielectricAlbedo>(material->medium.eta);
-        body->boundary = boundary;
         const Profile profile = Dipole(material->medium);
-        body->total_reflectance = albedo(profile);
+        bodies[i] = std::make_unique<Body>(Body{material, boundary, profile, albedo(profile), nullptr});
 
         const Mesh world_mesh = transformed(scene.meshes[object.mesh], object.local_to_world);
         const double area = surface_area(world_mesh);
-        if (area > 0.0) {
-            try {
-                Stopwatch points_watch(stats.seconds["points"]);
-                const float spacing = point_spacing(*material, area, options);
-                const PointSet points = points_of(object, world_mesh, spacing, options.seed, shared, progress);
-                points_watch.stop();
+        if (!(area > 0.0)) continue;
+        try {
+            Stopwatch points_watch(stats.seconds["points"]);
+            const float spacing = point_spacing(*material, area, options);
+            lit[i].points = points_of(object, world_mesh, spacing, options.seed, shared, progress);
+            points_watch.stop();
 
-                // What the boundary reflects does not enter.
-                Stopwatch bake_watch(stats.seconds["bake"]);
-                const float alpha = alpha_from_roughness(material->roughness.value);
-                const auto transmittance = [&](float cos_theta) {
-                    return 1.0f - material->specular * boundary->eval(cos_theta, alpha);
-                };
-                Irradiance irradiance = bake_irradiance(points, ray_scene, lights, transmittance,
-                                                        {options.bake_samples, options.seed}, progress);
-                bake_watch.stop();
-                stats.bake_rays += irradiance.rays;
-                stats.dropped_samples += irradiance.dropped_samples;
-
-                Stopwatch tree_watch(stats.seconds["tree"]);
-                body->tree = std::make_unique<const PointTree>(points, std::move(irradiance.values), irradiance.groups,
-                                                               profile, material->ramp);
-                stats.points += body->tree->point_count();
-                stats.nodes += body->tree->node_count();
-            } catch (const ValueError& error) {
-                throw ValueError(str(object.path, ": ", error.what()));
-            }
+            Stopwatch bake_watch(stats.seconds["bake"]);
+            const auto transmittance = [&](float cos_theta) {
+                return bodies[i]->transmittance(cos_theta, material->roughness.value);
+            };
+            Irradiance irradiance = bake_irradiance(lit[i].points, ray_scene, lights, transmittance,
+                                                    {options.bake_samples, options.seed}, progress);
+            stats.bake_rays += irradiance.rays;
+            stats.dropped_samples += irradiance.dropped_samples;
+            lit[i].irradiance = std::move(irradiance.values);
+        } catch (const ValueError& error) {
+            throw ValueError(str(object.path, ": ", error.what()));
         }
-        bodies[i] = std::move(body);
+    }
+    add_bounces(scene, ray_scene, lights, options, bodies, lit, stats, progress);
+
+    const std::size_t groups = light_groups(scene.lights).size();
+    Stopwatch tree_watch(stats.seconds["tree"]);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i] || lit[i].points.size() == 0) continue;
+        bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, std::move(lit[i].irradiance), groups,
+                                                            bodies[i]->profile, bodies[i]->material->ramp);
+        stats.points += bodies[i]->tree->point_count();
+        stats.nodes += bodies[i]->tree->node_count();
+        lit[i] = {};
     }
     return bodies;
 }

@@ -194,12 +194,7 @@ void PathTracer::request_gather(const Path& path, const Surface& surface, const 
     if (!body || !body->tree || body->material->translucency == 0.0f) return;
     const IceMaterial& ice = *body->material;
 
-    // Exitance to radiance: diffuse inside, then through the boundary; normalised so that T/T_avg averages to one.
-    const float alpha = alpha_from_roughness(eval_float(ice.roughness, surface.st));
-    const float leaving = 1.0f - ice.specular * body->boundary->eval(surface.normal.dot(wo), alpha);
-    const float leaving_average = 1.0f - ice.specular * body->boundary->average(alpha);
-    const Rgb tint = eval_color(ice.tint, surface.st);
-    const Rgb weight = tint * (ice.translucency * kInvPi * leaving / leaving_average);
+    const Rgb weight = body->radiance_per_exitance(surface, wo);
 
     GatherRequest request;
     request.object = surface.object;
@@ -223,7 +218,7 @@ void PathTracer::request_gather(const Path& path, const Surface& surface, const 
         if (sample.pdf > 0.0f && cosine > 0.0f && surface.geometric_normal.dot(sample.direction) > 0.0f &&
             !ray_scene_.is_occluded(shadow)) {
             const Light& light = lights_.lights()[sample.light];
-            const float entering = 1.0f - ice.specular * body->boundary->eval(cosine, alpha);
+            const float entering = body->transmittance(cosine, eval_float(ice.roughness, surface.st));
             request.entering =
                 sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
             request.entering_group = static_cast<std::uint32_t>(group_of_light_[sample.light]);

@@ -25,6 +25,7 @@ void check_options(const RenderOptions& options) {
     require(options.height >= 1 && options.height <= 65536, "height must be in 1..65536", options.height);
     require(options.samples >= 1, "samples must be >= 1", options.samples);
     require(options.bake_samples >= 1, "bake_samples must be >= 1", options.bake_samples);
+    require(options.bake_bounces >= 0, "bake_bounces must be >= 0", options.bake_bounces);
     require(options.max_bounces >= 0, "max_bounces must be >= 0", options.max_bounces);
     require(options.threads >= 0, "threads must be >= 0", options.threads);
     require(std::isfinite(options.spacing) && options.spacing >= 0.0f, "spacing must be >= 0", options.spacing);

@@ -1,0 +1,18 @@
+// Light that reaches the points of ice by way of other surfaces: ice lights ice, and diffuse surfaces light ice.
+// Model: the light of one bounce is gathered where the points' rays meet ice, compensated as the material says, and enters
+//   the points as the light of the next; opaque surfaces reflect, diffusely, what comes straight from lights.
+// Units: W/m².
+// Valid: the same bits for any number of threads.
+// Not: light that ice throws on opaque surfaces and these throw back; glossy paths.
+#pragma once
+
+#include "frazil/render/bodies.h"
+
+namespace frazil {
+
+// Add options.bake_bounces bounces to the irradiance of every body's points; `lit` runs along with `bodies`.
+void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
+                 const RenderOptions& options, const std::vector<std::unique_ptr<Body>>& bodies,
+                 std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress);
+
+}  // namespace frazil
