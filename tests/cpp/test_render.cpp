@@ -4,90 +4,17 @@
 
 #include "frazil/base/error.h"
 #include "frazil/render/render.h"
-#include "shapes.h"
+#include "scenes.h"
 
 using namespace frazil;
-
-namespace {
-
-Light dome(const Rgb& radiance, const std::string& group = "") {
-    Light light;
-    light.path = "/dome";
-    light.group = group;
-    light.shape = DomeLight{};
-    light.radiance = radiance;
-    return light;
-}
-
-Light rect_above(float radiance, const std::string& group) {
-    Light light;
-    light.path = "/rect";
-    light.group = group;
-    light.shape = RectLight{2.0f, 2.0f};
-    light.radiance = Rgb(radiance);
-    light.light_to_world.rotate(V3f(-kPi / 2.0f, 0.0f, 0.0f));
-    light.light_to_world[3][1] = 3.0f;
-    return light;
-}
-
-Scene scene_of(Mesh mesh, const Material& material) {
-    Scene scene;
-    scene.meshes = {std::move(mesh)};
-    scene.mesh_paths = {"/shape"};
-    scene.materials = {material};
-    scene.objects = {{"/shape", 0, 0, M44f()}};
-    scene.camera.path = "/camera";
-    scene.camera.horizontal_aperture = scene.camera.vertical_aperture = 20.0f;
-    scene.camera.camera_to_world.translate(V3f(0.0f, 0.0f, 6.0f));
-    return scene;
-}
-
-Material ice(const Rgb& sigma_a, float eta, float roughness, CompensationMode mode) {
-    IceMaterial model;
-    model.medium = {Rgb(20.0f), sigma_a, eta};
-    model.roughness.value = roughness;
-    model.compensation.mode = mode;
-    model.spacing = 0.04f;
-    return {"/ice", model};
-}
-
-RenderOptions small() {
-    RenderOptions options;
-    options.width = options.height = 24;
-    options.samples = 16;
-    options.filter = PixelFilter::box;
-    options.threads = 2;
-    return options;
-}
-
-const float* pixel(const Film& film, const char* layer, int x, int y) {
-    const Layer& found = film.layers.at(layer);
-    return &found.pixels[(std::size_t(y) * film.width + x) * found.channels];
-}
-
-// Mean of a layer's channel over pixels that the object fills.
-double mean_inside(const Film& film, const char* layer, int channel) {
-    double sum = 0.0;
-    int count = 0;
-    for (int y = 0; y < film.height; ++y) {
-        for (int x = 0; x < film.width; ++x) {
-            if (pixel(film, "beauty", x, y)[3] < 1.0f) continue;
-            sum += pixel(film, layer, x, y)[channel];
-            ++count;
-        }
-    }
-    REQUIRE(count > 20);
-    return sum / count;
-}
-
-}  // namespace
+using namespace frazil::test;
 
 TEST_CASE("white furnace: ice that absorbs nothing is invisible in uniform light") {
     for (const float eta : {1.0f, 1.31f}) {
         for (const float roughness : {0.2f, 0.7f}) {
             CAPTURE(eta);
             CAPTURE(roughness);
-            Scene scene = scene_of(test::sphere(1.0f, 4), ice(Rgb(1e-6f), eta, roughness, CompensationMode::conserve));
+            Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), eta, roughness, CompensationMode::conserve));
             scene.lights = {dome(Rgb(1.0f))};
             RenderOptions options = small();
             options.samples = 64;
@@ -103,7 +30,7 @@ TEST_CASE("white furnace: a white diffuse sphere without reflection is invisible
     StandardMaterial model;
     model.diffuse_color.value = Rgb(1.0f);
     model.ior = 1.0f;
-    Scene scene = scene_of(test::sphere(1.0f, 4), {"/white", model});
+    Scene scene = scene_of(sphere(1.0f, 4), {"/white", model});
     scene.lights = {dome(Rgb(1.0f))};
     const Film film = render(scene, small()).film;
     CHECK(mean_inside(film, "beauty", 0) == doctest::Approx(1.0).epsilon(0.01));
@@ -114,7 +41,7 @@ TEST_CASE("a diffuse floor under a rect light has radiance albedo E / pi by the 
     StandardMaterial model;
     model.diffuse_color.value = Rgb(0.5f);
     model.ior = 1.0f;
-    Scene scene = scene_of(test::floor_square(5.0f, 0.0f), {"/grey", model});
+    Scene scene = scene_of(floor_square(5.0f, 0.0f), {"/grey", model});
     scene.lights = {rect_above(2.0f, "")};
     // Look straight down at the point under the light's centre, from below the light.
     scene.camera.camera_to_world = M44f();
@@ -131,8 +58,8 @@ TEST_CASE("a diffuse floor under a rect light has radiance albedo E / pi by the 
 }
 
 TEST_CASE("the additive layers sum to the beauty, and light groups to their layers, exactly") {
-    Scene scene = scene_of(test::sphere(1.0f, 3), ice(Rgb(0.5f, 0.1f, 0.02f), 1.31f, 0.3f, CompensationMode::ratio));
-    scene.meshes.push_back(test::floor_square(4.0f, -1.0f));
+    Scene scene = scene_of(sphere(1.0f, 3), ice(Rgb(0.5f, 0.1f, 0.02f), 1.31f, 0.3f, CompensationMode::ratio));
+    scene.meshes.push_back(floor_square(4.0f, -1.0f));
     scene.mesh_paths.push_back("/floor");
     scene.materials.push_back({"/grey", StandardMaterial{}});
     scene.objects.push_back({"/floor", 1, 1, M44f()});
@@ -160,7 +87,7 @@ TEST_CASE("the additive layers sum to the beauty, and light groups to their laye
 }
 
 TEST_CASE("one and two threads give the same bits") {
-    Scene scene = scene_of(test::sphere(1.0f, 3), ice(Rgb(0.5f, 0.1f, 0.02f), 1.31f, 0.3f, CompensationMode::ratio));
+    Scene scene = scene_of(sphere(1.0f, 3), ice(Rgb(0.5f, 0.1f, 0.02f), 1.31f, 0.3f, CompensationMode::ratio));
     scene.lights = {dome(Rgb(0.3f, 0.4f, 0.6f)), rect_above(5.0f, "")};
     RenderOptions options = small();
     options.threads = 1;
@@ -178,7 +105,7 @@ TEST_CASE("fill adds what the coverage lacks: the flat floor stays, the mean of 
     const auto mean_translucency = [&](CompensationMode mode) {
         Material material = ice(Rgb(0.2f), 1.31f, 0.3f, mode);
         std::get<IceMaterial>(material.model).medium = medium;
-        Scene scene = scene_of(test::sphere(1.0f, 4), material);
+        Scene scene = scene_of(sphere(1.0f, 4), material);
         scene.lights = {dome(Rgb(1.0f))};
         RenderOptions options = small();
         options.samples = 64;
@@ -193,7 +120,7 @@ TEST_CASE("fill adds what the coverage lacks: the flat floor stays, the mean of 
 }
 
 TEST_CASE("depth, position, normal and object id are those of what is seen") {
-    Scene scene = scene_of(test::sphere(1.0f, 5), {"/grey", StandardMaterial{}});
+    Scene scene = scene_of(sphere(1.0f, 5), {"/grey", StandardMaterial{}});
     RenderOptions options = small();
     options.width = options.height = 25;
     const Film film = render(scene, options).film;
@@ -207,7 +134,7 @@ TEST_CASE("depth, position, normal and object id are those of what is seen") {
 }
 
 TEST_CASE("options and scenes out of range are refused by name") {
-    const Scene scene = scene_of(test::sphere(1.0f, 1), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
+    const Scene scene = scene_of(sphere(1.0f, 1), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
     RenderOptions options = small();
     options.width = 0;
     CHECK_THROWS_WITH_AS(render(scene, options), doctest::Contains("width must be in 1..65536"), ValueError);
@@ -224,7 +151,7 @@ TEST_CASE("options and scenes out of range are refused by name") {
 }
 
 TEST_CASE("a stop that is asked for ends the render") {
-    const Scene scene = scene_of(test::sphere(1.0f, 1), {"/grey", StandardMaterial{}});
+    const Scene scene = scene_of(sphere(1.0f, 1), {"/grey", StandardMaterial{}});
     Progress progress({}, [] { return true; });
     CHECK_THROWS_AS(render(scene, small(), &progress), Cancelled);
 }

@@ -1,0 +1,51 @@
+#include <doctest/doctest.h>
+
+#include "scenes.h"
+
+using namespace frazil;
+using namespace frazil::test;
+
+TEST_CASE("furnace over a white floor: what the floor sends back takes the place of the sky that it hides") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.31f, 0.3f, CompensationMode::conserve));
+    StandardMaterial white;
+    white.diffuse_color.value = Rgb(1.0f);
+    white.ior = 1.0f;
+    scene.meshes.push_back(floor_square(400.0f, -10.0f));
+    scene.mesh_paths.push_back("/floor");
+    scene.materials.push_back({"/white", white});
+    scene.objects.push_back({"/floor", 1, 1, M44f()});
+    scene.lights = {dome(Rgb(1.0f))};
+    // Only the sphere in view.
+    scene.camera.focal_length = 100.0f;
+    RenderOptions options = small();
+    options.samples = 64;
+    options.bake_bounces = 1;
+    CHECK(mean_inside(render(scene, options).film, "translucency", 0) +
+              mean_inside(render(scene, options).film, "specular", 0) ==
+          doctest::Approx(1.0).epsilon(0.02));
+    options.bake_bounces = 0;
+    CHECK(mean_inside(render(scene, options).film, "translucency", 0) < 0.8);
+}
+
+TEST_CASE("furnace of two white spheres: ice lights ice until it cannot be told from the sky") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.0f, 0.3f, CompensationMode::conserve));
+    M44f beside;
+    beside.translate(V3f(0.0f, 2.01f, 0.0f));
+    scene.objects.push_back({"/other", 0, 0, beside});
+    scene.lights = {dome(Rgb(1.0f))};
+    RenderOptions options = small();
+    options.bake_bounces = 6;
+    CHECK(mean_inside(render(scene, options).film, "translucency", 0) == doctest::Approx(1.0).epsilon(0.01));
+    options.bake_bounces = 0;
+    CHECK(mean_inside(render(scene, options).film, "translucency", 0) < 0.97);
+}
+
+TEST_CASE("a convex body alone sees no ice: bounces change no bit") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(0.2f), 1.31f, 0.3f, CompensationMode::ratio));
+    scene.lights = {dome(Rgb(0.3f, 0.4f, 0.6f)), rect_above(5.0f, "key")};
+    RenderOptions options = small();
+    options.bake_bounces = 0;
+    const Film without = render(scene, options).film;
+    options.bake_bounces = 2;
+    CHECK(render(scene, options).film.layers.at("beauty").pixels == without.layers.at("beauty").pixels);
+}
