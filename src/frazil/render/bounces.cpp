@@ -1,9 +1,11 @@
 #include "frazil/render/bounces.h"
 
 #include <algorithm>
+#include <memory>
 #include <numeric>
 
 #include "frazil/lighting/bounce.h"
+#include "frazil/points/point_lookup.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -11,53 +13,38 @@ namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
 
-// What ice sends towards the points that see it, from trees of the last bounce's light alone.
-class IceRadiance {
-  public:
-    IceRadiance(const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::unique_ptr<PointTree>>& trees,
-                const SurfaceResolver& resolver, const GatherOptions& options, std::size_t groups)
-        : bodies_(bodies), trees_(trees), resolver_(resolver), options_(options), groups_(groups) {}
-
-    void operator()(std::span<const BounceHit> hits, std::span<Rgb> radiance) const {
-        // One gather per body that is seen.
-        std::vector<std::size_t> order;
-        for (std::size_t i = 0; i < hits.size(); ++i) {
-            if (trees_[hits[i].surface.placement]) order.push_back(i);
-        }
-        std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-            return hits[a].surface.placement < hits[b].surface.placement;
-        });
-        std::vector<V3f> positions;
-        for (std::size_t begin = 0; begin < order.size();) {
-            const std::uint32_t object = hits[order[begin]].surface.placement;
-            positions.clear();
-            std::size_t end = begin;
-            for (; end < order.size() && hits[order[end]].surface.placement == object; ++end) {
-                positions.push_back(hits[order[end]].position);
-            }
-            const Body& body = *bodies_[object];
-            const Gathered gathered = trees_[object]->gather(positions.data(), positions.size(), options_);
-            for (std::size_t k = begin; k < end; ++k) {
-                const BounceHit& hit = hits[order[k]];
-                const Rgb gain = compensation_gain(body.material->compensation, gathered.coverage[k - begin],
-                                                   body.total_reflectance);
-                const Surface surface = resolver_.resolve(hit.surface, hit.direction);
-                const Rgb scale = gain * body.radiance_per_exitance(surface, -hit.direction);
-                for (std::size_t g = 0; g < groups_; ++g) {
-                    radiance[order[k] * groups_ + g] = gathered.exitance[(k - begin) * groups_ + g] * scale;
-                }
-            }
-            begin = end;
-        }
-    }
-
-  private:
-    const std::vector<std::unique_ptr<Body>>& bodies_;
-    const std::vector<std::unique_ptr<PointTree>>& trees_;
-    const SurfaceResolver& resolver_;
-    GatherOptions options_;
-    std::size_t groups_;
+// What a body sends out, point by point: the light of the last bounce alone.
+struct Exitance {
+    std::vector<Rgb> values;  // (N, groups), compensated; empty where there is no body
+    std::unique_ptr<const PointLookup> lookup;
 };
+
+Exitance exitance_of(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
+                     const GatherOptions& options) {
+    const PointTree tree(points, irradiance, groups, body.profile, body.material->ramp);
+    Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        const Rgb gain = compensation_gain(body.material->compensation, gathered.coverage[k], body.total_reflectance);
+        for (std::size_t g = 0; g < groups; ++g) gathered.exitance[k * groups + g] *= gain;
+    }
+    return {std::move(gathered.exitance), std::make_unique<const PointLookup>(points)};
+}
+
+// Fill in what the ice that is seen sends; other surfaces are left as they are.
+void add_ice(const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<Exitance>& exitance,
+             const SurfaceResolver& resolver, std::size_t groups, std::span<const BounceHit> hits,
+             std::span<Rgb> radiance) {
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+        const BounceHit& hit = hits[i];
+        const Exitance& sent = exitance[hit.surface.placement];
+        if (!sent.lookup) continue;
+        const std::uint32_t point = sent.lookup->nearest(hit.position, hit.surface.geometric_normal);
+        if (point == PointLookup::kNone) continue;
+        const Surface surface = resolver.resolve(hit.surface, hit.direction);
+        const Rgb scale = bodies[hit.surface.placement]->radiance_per_exitance(surface, -hit.direction);
+        for (std::size_t g = 0; g < groups; ++g) radiance[i * groups + g] = sent.values[point * groups + g] * scale;
+    }
+}
 
 // The diffuse albedo of what a ray of a point meets; 0 for ice.
 Rgb diffuse_albedo(const SurfaceResolver& resolver, const BounceHit& hit) {
@@ -85,20 +72,18 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     std::vector<std::vector<Rgb>> last(lit.size());  // what the last bounce brought
     for (std::size_t i = 0; i < lit.size(); ++i) last[i] = lit[i].irradiance;
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
-        std::vector<std::unique_ptr<PointTree>> trees(lit.size());
+        std::vector<Exitance> exitance(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;
-            trees[i] = std::make_unique<PointTree>(lit[i].points, last[i], groups, bodies[i]->profile,
-                                                   bodies[i]->material->ramp);
+            exitance[i] = exitance_of(*bodies[i], lit[i].points, last[i], groups, options.gather);
         }
-        const IceRadiance ice(bodies, trees, resolver, options.gather, groups);
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;
             const IceMaterial& material = *bodies[i]->material;
             const Irradiance brought = bake_bounce(
                 lit[i].points, ray_scene, groups,
                 [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
-                    ice(hits, radiance);
+                    add_ice(bodies, exitance, resolver, groups, hits, radiance);
                     if (bounce == 0) reflected(hits, radiance);
                 },
                 [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); },

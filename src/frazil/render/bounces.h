@@ -1,6 +1,7 @@
 // Light that reaches the points of ice by way of other surfaces: ice lights ice, and diffuse surfaces light ice.
-// Model: the light of one bounce is gathered where the points' rays meet ice, compensated as the material says, and enters
-//   the points as the light of the next; opaque surfaces reflect, diffusely, what comes straight from lights.
+// Model: each bounce is one gather at the points themselves, compensated as the material says, and one look around from
+//   every point: ice that it sees sends the exitance of its nearest point; opaque surfaces reflect, diffusely, what comes
+//   straight from lights.
 // Units: W/m².
 // Valid: the same bits for any number of threads.
 // Not: light that ice throws on opaque surfaces and these throw back; glossy paths.
