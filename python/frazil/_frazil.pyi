@@ -994,7 +994,7 @@ class RenderResult:
 def aov_table() -> list:
     """The AOV table: a list of dicts (name, channels, meaning, filter, ...)."""
 
-def render(scene: Scene, *, width: int = 960, height: int = 540, samples: int = 32, seed: int = 0, threads: int = 0, filter: str = 'blackman_harris', max_bounces: int = 4, spacing: float = 0.0, spacing_scale: float = 1.0, bake_samples: int = 64, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', progress: object | None = None) -> RenderResult:
+def render(scene: Scene, *, width: int = 960, height: int = 540, samples: int = 32, seed: int = 0, threads: int = 0, filter: str = 'blackman_harris', max_bounces: int = 4, spacing: float = 0.0, spacing_scale: float = 1.0, bake_samples: int = 64, bake_bounces: int = 1, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', progress: object | None = None) -> RenderResult:
     """
     Render a scene; see frazil.render. progress(stage, fraction) is called now and then from any thread;
     an exception that it raises stops the render.
