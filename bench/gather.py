@@ -80,9 +80,7 @@ def main() -> None:
 def report(points, light, profile, shading, checked, options) -> None:
     tree, wall, cpu = clocked(lambda: fz.PointTree(points, light, profile))
     million = len(points.areas) / 1e6
-    print(
-        f"{million:g} M points, G={light.shape[1]}: built {million / wall:.2f} M/s wall, {million / cpu:.2f} cpu"
-    )
+    print(f"{million:g} M points, G={light.shape[1]}: built {million / wall:.2f} M/s wall, {million / cpu:.2f} cpu")
     for estimator in options.estimator:
         exact = tree.gather_exact(shading[checked], "sum")
         for tolerance in options.tolerance:

@@ -2,7 +2,7 @@
 
 A reference is an .npz with `radiance` (H, W, 3), `coverage` (H, W) and `params`, a JSON text: mesh, sigma_s_prime and
 sigma_a in 1/unit, env (radiance from all around), light [centre, target, half size, radiance], camera [origin, target],
-fov in degrees across the width. The boundary is index-matched (eta = 1). Only pixels that the object fills are compared.
+fov in degrees across the width. The boundary is index-matched (eta = 1). Only pixels that the object fills count.
 
     python bench/truth.py REFERENCE.npz MESH.ply [--out DIR]
 """

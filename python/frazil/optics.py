@@ -99,9 +99,7 @@ def impurity_absorption(kind: str, mass_fraction: float) -> np.ndarray:
     if kind not in _IMPURITIES:
         raise ValueError(f"impurity_absorption: kind must be one of {', '.join(_IMPURITIES)}, got {kind!r}.")
     if not (mass_fraction >= 0 and np.isfinite(mass_fraction)):
-        raise ValueError(
-            f"impurity_absorption: mass_fraction must be >= 0, got {mass_fraction}. It is kg per kg."
-        )
+        raise ValueError(f"impurity_absorption: mass_fraction must be >= 0, got {mass_fraction}. It is kg per kg.")
     per_mass, at_nm, exponent = _IMPURITIES[kind]
     return mass_fraction * ICE_DENSITY * per_mass * (WAVELENGTHS_NM / at_nm) ** -exponent
 

@@ -1,22 +1,25 @@
 """Meshes from files, and the command that places points on them."""
 
+import contextlib
+import io
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
-import typer
 from point_checks import mesh_of
-from typer.testing import CliRunner
 
 import frazil as fz
-from frazil.cli.points import points_command
+from frazil.cli import main
 from frazil.mesh_io import read_mesh
-
-app = typer.Typer()
-app.command()(points_command)
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments])
+    """`frazil points ARGUMENTS`: its exit status and all that it prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+        status = main(["points", *map(str, arguments)])
+    return SimpleNamespace(exit_code=status, output=printed.getvalue())
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "glb"])
@@ -75,6 +78,26 @@ def test_bad_files(tmp_path):
         result = run(path, "-o", tmp_path / "p.ply", "--spacing", 0.1, "--quiet")
         assert result.exit_code == 1
         assert str(path) in result.output
+
+
+@pytest.mark.parametrize("name", ["p.ply", "p.usda"])
+def test_what_cannot_be_written_leaves_the_old_file(tmp_path, monkeypatch, name):
+    path = tmp_path / "ball.ply"
+    trimesh.creation.icosphere(2).export(path)
+    result = run(path, "-o", tmp_path / "none" / name, "--spacing", 0.3, "--quiet")
+    assert result.exit_code == 1
+    assert "folder must exist" in result.output
+    (tmp_path / name).write_text("old")
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("frazil.replacing.os.replace", full_disk)
+    result = run(path, "-o", tmp_path / name, "--spacing", 0.3, "--quiet")
+    assert result.exit_code == 1
+    assert len(result.output.splitlines()) == 1
+    assert (tmp_path / name).read_text() == "old"
+    assert {p.name for p in tmp_path.iterdir()} == {"ball.ply", name}
 
 
 def test_misuse(tmp_path):

@@ -84,6 +84,20 @@ def test_no_camera_frames_the_scene_and_no_light_gives_a_grey_dome(tmp_path):
     assert (np.abs(local[:, 1] / local[:, 2]) < camera.vertical_aperture / 2 / camera.focal_length).all()
 
 
+def test_framing_fills_the_picture(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "s.usda"))
+    UsdGeom.Sphere.Define(stage, "/Sphere").AddTranslateOp().Set(Gf.Vec3d(1e5, 0, 0))
+    scene = load(stage)
+    camera = scene.camera
+    positions = world_positions(scene).astype(float)
+    local = np.c_[positions, np.ones(len(positions))] @ np.linalg.inv(camera.matrix)
+    y = -local[:, 1] / local[:, 2] * 2 * camera.focal_length / camera.vertical_aperture
+    assert 0.85 < y.max() < 1
+    assert -1 < y.min() < -0.85
+    assert camera.clipping[0] < -local[:, 2].max()
+    assert -local[:, 2].min() < camera.clipping[1]
+
+
 def test_time_samples(tmp_path):
     stage = new_stage(tmp_path / "s.usda")
     quad = add_quad(stage, "/Quad")
@@ -254,3 +268,18 @@ def test_the_same_scene_in_metres_and_centimetres_gives_the_same_picture(tmp_pat
     # Only rounding differs; points may fall elsewhere where a tie breaks the other way.
     assert abs(metres.mean() / centimetres.mean() - 1) < 0.01
     np.testing.assert_allclose(metres, centimetres, atol=0.05 * metres.max())
+
+
+def test_render_settings_that_are_not_honoured_are_named(tmp_path):
+    stage = new_stage(tmp_path / "s.usda")
+    add_quad(stage, "/Quad")
+    settings = UsdRender.Settings.Define(stage, "/Settings")
+    settings.CreatePixelAspectRatioAttr(2.0)
+    settings.CreateDataWindowNDCAttr(Gf.Vec4f(0, 0, 0.5, 1))
+    settings.CreateIncludedPurposesAttr(["default", "proxy"])
+    product = UsdRender.Product.Define(stage, "/Product")
+    product.CreateProductNameAttr("beauty.exr")
+    settings.CreateProductsRel().SetTargets(["/Product"])
+    said = "\n".join(load(stage).warnings)
+    for what in ("pixelAspectRatio 2", "dataWindowNDC", "asks for proxy", "/Product: productName"):
+        assert what in said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -32,33 +33,33 @@ def points_command(
     import frazil as fz
     from frazil.mesh_io import read_mesh
 
+    from ..replacing import check_writable, replacing
+
     if (spacing is None) == (count is None):
         raise typer.BadParameter("give --spacing or --count, and not both")
     if tessellated and spacing is None:
         raise typer.BadParameter("--tessellated needs --spacing")
-    try:
-        surface = read_mesh(mesh, frame=frame)
-        with Progress(console=Console(stderr=True), transient=True, disable=quiet) as bar:
-            tasks = {}
+    check_writable(output)
+    surface = read_mesh(mesh, frame=frame)
+    with Progress(console=Console(stderr=True), transient=True, disable=quiet) as bar:
+        tasks = {}
 
-            def report(stage: str, fraction: float) -> None:
-                if stage not in tasks:
-                    tasks[stage] = bar.add_task(stage, total=1.0)
-                bar.update(tasks[stage], completed=fraction)
+        def report(stage: str, fraction: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=1.0)
+            bar.update(tasks[stage], completed=fraction)
 
-            if tessellated:
-                points = fz.tessellated_points(surface, spacing)
-            else:
-                points = fz.poisson_points(
-                    surface, spacing, seed, count=count, thin_walls=thin_walls, threads=threads, progress=report
-                )
-        if output.suffix.lower() in USD_SUFFIXES:
-            save_usd(points, output)
+        if tessellated:
+            points = fz.tessellated_points(surface, spacing)
         else:
-            points.save(output)
-    except (ValueError, OSError) as error:
-        typer.echo(f"frazil: error: {error}", err=True)
-        raise typer.Exit(1) from None
+            points = fz.poisson_points(
+                surface, spacing, seed, count=count, thin_walls=thin_walls, threads=threads, progress=report
+            )
+    if output.suffix.lower() in USD_SUFFIXES:
+        save_usd(points, output)
+    else:
+        with replacing(output) as temporary:
+            points.save(temporary)
     typer.echo(f"{len(points)} points, spacing {points.spacing:.6g}, area {points.areas.sum(dtype='f8'):.6g}: {output}")
     if stats:
         measured = fz.point_statistics(points, surface, thin_walls=thin_walls)
@@ -70,7 +71,9 @@ def points_command(
 
 def save_usd(points, path: Path) -> None:
     """Write a UsdGeom.Points prim /Points in metres, with normals, widths and the rest as primvars."""
-    from pxr import Sdf, Usd, UsdGeom, Vt
+    from pxr import Sdf, Tf, Usd, UsdGeom, Vt
+
+    from ..replacing import replacing
 
     stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -93,5 +96,13 @@ def save_usd(points, path: Path) -> None:
     ):
         api.CreatePrimvar(name, kind, vertex).Set(values)
     api.CreatePrimvar("frazil:spacing", types.Double, UsdGeom.Tokens.constant).Set(points.spacing)
-    if not stage.GetRootLayer().Export(str(path)):
-        raise OSError(f"{path}: file must be writable, got an error while writing. Check the folder and disk.")
+    # USD tells its formats by suffix, so the file is made under its own name in a folder of its own.
+    with replacing(path) as temporary, tempfile.TemporaryDirectory(dir=path.resolve().parent) as folder:
+        whole = Path(folder) / path.name
+        try:
+            is_written = stage.GetRootLayer().Export(str(whole))
+        except Tf.ErrorException as error:
+            raise OSError(f"{path}: cannot be written: {error.args[0].commentary}") from None
+        if not is_written:
+            raise OSError(f"{path}: file must be writable, got an error while writing. Check the folder and disk.")
+        whole.replace(temporary)

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdGeom
 from .._frazil import Camera, Scene
 from .context import ReadContext, is_singular
 
+_MOST_FRAMED_VERTICES = 2_000_000  # above, boxes stand for meshes when the scene is framed
 _APERTURE_UNIT = 0.1  # apertures and focal lengths are in tenths of a scene unit
 
 
@@ -124,32 +125,47 @@ def box_corners(scene: Scene) -> np.ndarray:
 
 
 def frame_scene(scene: Scene) -> Camera:
-    """A camera in front of the scene, a little above and to the right, that sees all of it."""
-    corners = box_corners(scene)
-    if len(corners) == 0:
-        corners = np.zeros((1, 3))
+    """A camera in front of the scene, a little above and to the right, that sees all of it and little else."""
+    places = _outline(scene)
+    if len(places) == 0:
+        places = np.zeros((1, 3))
     backwards = np.array([0.45, 0.35, 1.0])
     backwards /= np.linalg.norm(backwards)
     right = np.cross([0.0, 1.0, 0.0], backwards)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(backwards, right), backwards])
 
-    # The least distance from which a 16:9 picture holds every corner, and a tenth more.
+    # A place (x, y, z) is within the picture where |x - cx| <= t (d - z), likewise y: the nearest d and its centre.
     focal_length, width = 50.0, 20.955
     height = width * 9 / 16
-    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    local = (corners - center) @ axes.T
-    reach = np.abs(local[:, :2]) * (2 * focal_length / np.array([width, height])) * 1.1
-    distance = max(float((local[:, 2:] + reach).max()), 1e-3)
-    radius = float(np.linalg.norm(local, axis=1).max())
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    local = (places - middle) @ axes.T
+    slope = np.array([width, height]) / (2 * focal_length) / 1.1  # a tenth more than the scene
+    above = (local[:, :2] + slope * local[:, 2:]).max(axis=0)
+    below = (-local[:, :2] + slope * local[:, 2:]).max(axis=0)
+    nearest = float(local[:, 2].max())
+    size = float(np.linalg.norm(local, axis=1).max())
+    distance = max(float(((above + below) / (2 * slope)).max()), nearest + 1e-3 * size, 1e-3)
     matrix = np.eye(4)
     matrix[:3, :3] = axes
-    matrix[3, :3] = center + distance * backwards
+    matrix[3, :3] = middle + np.array([*((above - below) / 2), distance]) @ axes
     return Camera(
         matrix=matrix,
         focal_length=focal_length,
         horizontal_aperture=width,
         vertical_aperture=height,
-        clipping=(1e-3 * distance, 2 * (distance + radius)),
+        clipping=(min(1e-3 * distance, 0.5 * max(distance - nearest, 1e-6)), 2 * (distance + size)),
         path="/framing_camera",
     )
+
+
+def _outline(scene: Scene) -> np.ndarray:
+    """Places (N, 3) that hold the scene: every vertex where they are few enough, else the corners of the boxes."""
+    if sum(len(scene.mesh(item.mesh).positions) for item in scene.objects) > _MOST_FRAMED_VERTICES:
+        return box_corners(scene)
+    parts = [np.zeros((0, 3))]
+    for item in scene.objects:
+        mesh, matrix = scene.mesh(item.mesh), item.matrix
+        used = mesh.positions[np.unique(mesh.triangles)].astype(np.float64)
+        parts.append(used @ matrix[:3, :3] + matrix[3, :3])
+    return np.concatenate(parts)

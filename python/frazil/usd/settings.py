@@ -70,7 +70,28 @@ def read_render_settings(context: ReadContext) -> RenderSettings | None:
             context.warn(settings.GetPath(), f"names the product <{target}>, which does not exist.")
             continue
         result.products.append(_read_product(context, product, resolution, camera))
+    _warn_of_unsupported(context, settings, result)
     return result
+
+
+def _warn_of_unsupported(context: ReadContext, settings: UsdRender.Settings, read: RenderSettings) -> None:
+    """Name what a render leaves to its own options."""
+    path = read.path
+    if read.pixel_aspect_ratio != 1.0:
+        context.warn(path, f"pixelAspectRatio {read.pixel_aspect_ratio:g} is not supported. Pixels are square.")
+    if read.data_window != (0.0, 0.0, 1.0, 1.0):
+        context.warn(path, "dataWindowNDC is not supported. The whole picture is rendered.")
+    purposes = context.get(settings.GetIncludedPurposesAttr())
+    if purposes and not set(purposes) <= context.purposes:
+        left_out = ", ".join(sorted(set(purposes) - context.purposes))
+        context.warn(path, f"includedPurposes asks for {left_out}, which is left out. Load with these purposes.")
+    for product in read.products:
+        if (product.resolution, product.camera) != (read.resolution, read.camera):
+            context.warn(product.path, "has a resolution or camera of its own. Those of the render settings are used.")
+        if product.name or product.vars:
+            context.warn(
+                product.path, "productName and orderedVars do not choose the output. The caller names file and layers."
+            )
 
 
 def _read_product(context: ReadContext, product: UsdRender.Product, resolution, camera) -> RenderProduct:
