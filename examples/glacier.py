@@ -37,8 +37,9 @@ def build(path: Path, detail: float, seed: int) -> None:
     frost = ice.frost(surface.positions, vertex_normals)
     writer.add_mesh("Ice", surface, normals, st=np.stack([frost, ice.layer(surface.positions)], 1))
 
-    snow = contour(Snow(ice), kLower, kUpper, 1.5 * cell)
-    writer.add_mesh("Snow", snow, corner_normals(snow, 80.0))
+    snow = Snow(ice)
+    drifts = contour(snow, *snow.bounds(), max(1.7 * cell, 0.02))
+    writer.add_mesh("Snow", drifts, corner_normals(drifts, 80.0))
     for name, center, size in (("RockLeft", (-1.52, 0.34, 0.80), (0.36, 0.30, 0.30)),
                                ("RockRight", (2.02, 0.16, 0.92), (0.42, 0.34, 0.36))):  # fmt: skip
         rock = Rock(center, size, seed + len(name))
@@ -49,7 +50,7 @@ def build(path: Path, detail: float, seed: int) -> None:
     field = make_snowfield(ice, 60.0, max(20, int(150 * detail)), seed)
     writer.add_mesh("Snowfield", field, corner_normals(field, 80.0))
 
-    width = int(np.clip(2048 * detail, 256, 4096)) // 2 * 2
+    width = int(np.clip(1280 * detail, 256, 4096)) // 2 * 2
     write_image(path.with_name(path.stem + "_sky.exr"), make_sky(width, kSun, seed))
     writer.write(kSun, stamp(detail, seed))
 

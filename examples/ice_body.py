@@ -97,6 +97,7 @@ class IceBody:
 
     def _union(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = self._block(p)
+        x, y, z = np.ascontiguousarray(p.T)
         thickness = np.full(len(p), 1.0)
         low, high = p.min(0), p.max(0)
         for shard in self.shards:
@@ -106,7 +107,10 @@ class IceBody:
             if gap > 0.3:
                 np.minimum(d, gap, out=d)
                 continue
-            box = np.maximum(a - p, p - b).max(1)
+            box = np.maximum(x - b[0], a[0] - x)
+            for k, column in ((1, y), (2, z)):
+                np.maximum(box, column - b[k], out=box)
+                np.maximum(box, a[k] - column, out=box)
             near = np.flatnonzero(box < 2.0 * kBlend)
             np.minimum(d, np.where(box < 2.0 * kBlend, np.inf, box), out=d)
             if len(near):
