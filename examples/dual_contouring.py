@@ -152,7 +152,7 @@ def _crossings(values: np.ndarray, inside: np.ndarray, axis: int):
 
 
 def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray:
-    # The crossing of each edge by two steps of false position; the middle where filling made it up.
+    # The crossing of each edge by a step of false position; the middle where filling made it up.
     start, along = lower + cell * base, cell * np.eye(3)[axis]
     s, t = np.zeros(len(a)), np.ones(len(a))
     made_up = (a < 0) == (b < 0)
@@ -161,12 +161,11 @@ def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray
         middle = np.where(made_up, 0.5, s + (t - s) * a / np.where(a == b, 1.0, a - b))
         return middle, start + middle[:, None] * along
 
-    for _ in range(2):
-        middle, p = point()
-        value = evaluate(field, p)
-        first = (value < 0) == (a < 0)
-        s, a = np.where(first, middle, s), np.where(first, value, a)
-        t, b = np.where(first, t, middle), np.where(first, b, value)
+    middle, p = point()
+    value = evaluate(field, p)
+    first = (value < 0) == (a < 0)
+    s, a = np.where(first, middle, s), np.where(first, value, a)
+    t, b = np.where(first, t, middle), np.where(first, b, value)
     return point()[1]
 
 

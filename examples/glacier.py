@@ -20,7 +20,7 @@ from scenery import Rock, Snow, make_snowfield
 from sky import make_sky, write_image
 from stage import SceneWriter
 
-kSun = np.array([-0.80, 0.34, -0.62])  # where the sun stands
+kSun = np.array([-0.90, 0.38, -0.42])  # where the sun stands
 kCell = 0.018  # metres between grid points at detail 1
 
 
@@ -38,7 +38,7 @@ def build(path: Path, detail: float, seed: int) -> None:
     writer.add_mesh("Ice", surface, normals, st=np.stack([frost, ice.layer(surface.positions)], 1))
 
     snow = Snow(ice)
-    drifts = contour(snow, *snow.bounds(), max(1.7 * cell, 0.02))
+    drifts = contour(snow, *snow.bounds(), max(1.7 * cell, 0.02)).largest_piece()
     writer.add_mesh("Snow", drifts, corner_normals(drifts, 80.0))
     for name, center, size in (("RockLeft", (-1.52, 0.34, 0.80), (0.36, 0.30, 0.30)),
                                ("RockRight", (2.02, 0.16, 0.92), (0.42, 0.34, 0.36))):  # fmt: skip

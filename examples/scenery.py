@@ -13,7 +13,7 @@ from dual_contouring import Surface
 from ice_body import IceBody, kLower, kUpper
 from noise import Noise, swirl
 
-kSnowTop = 0.85  # metres above which no snow holds
+kSnowTop = 0.72  # metres above which no snow holds
 kSnowRoot = 0.05  # metres that snow reaches into the ice below
 
 
@@ -62,9 +62,9 @@ class Snow:
         near = np.flatnonzero((ice > -kSnowRoot - 0.03) & (ice < 3.0 * self._depth))
         p = points[near]
         patch = 0.75 + 0.45 * self._ice.noise(p, 0.42, 110)
-        high = np.clip((kSnowTop - p[:, 1]) / 0.4, 0.0, 1.0)
+        high = np.clip((kSnowTop - p[:, 1]) / 0.3, 0.0, 1.0)
         depth = self._depth * np.clip(patch, 0.15, 1.2) * high
-        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + self._depth * (1.0 - 0.45 * high)
+        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + self._depth * (1.0 - 0.42 * high)
         result[near] = np.maximum(snow, -(ice[near] + kSnowRoot))
         return np.maximum(result, points[:, 1] - kSnowTop)
 

@@ -18,8 +18,8 @@ kStampKey = "glacier:madeFrom"
 # Ice with bubbles; absorption of pure ice times about eight, as two metres have to show what a glacier shows in twenty.
 kIceScattering = (20.0, 20.0, 20.0)
 kIceAbsorption = (2.4, 0.40, 0.10)
-kClearTint = np.array([0.90, 1.00, 1.03])
-kWhiteTint = np.array([2.6, 1.50, 1.20])
+kClearTint = np.array([0.84, 1.02, 1.08])
+kWhiteTint = np.array([1.9, 1.52, 1.34])
 
 
 class SceneWriter:
