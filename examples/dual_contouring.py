@@ -40,8 +40,8 @@ class Surface:
 
     def largest_piece(self) -> "Surface":
         """The connected piece with the most triangles: without the crumbs where thin tips slip through the grid."""
-        links = coo_matrix((np.ones(len(self.triangles)), (self.triangles[:, 0], self.triangles[:, 1])))
-        links.resize((len(self.positions),) * 2)
+        ends = self.triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+        links = coo_matrix((np.ones(len(ends)), ends.T), (len(self.positions),) * 2)
         _, piece = connected_components(links, directed=False)
         kept = piece == np.bincount(piece[self.triangles[:, 0]]).argmax()
         return Surface(self.positions[kept], (np.cumsum(kept) - 1)[self.triangles[kept[self.triangles[:, 0]]]])
@@ -152,7 +152,7 @@ def _crossings(values: np.ndarray, inside: np.ndarray, axis: int):
 
 
 def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray:
-    # The crossing of each edge by a step of false position; the middle where filling made it up.
+    # The crossing of each edge by two steps of false position; the middle where filling made it up.
     start, along = lower + cell * base, cell * np.eye(3)[axis]
     s, t = np.zeros(len(a)), np.ones(len(a))
     made_up = (a < 0) == (b < 0)
@@ -161,11 +161,12 @@ def _refined(field: Field, lower, cell, axis, base, a, b, _leaves) -> np.ndarray
         middle = np.where(made_up, 0.5, s + (t - s) * a / np.where(a == b, 1.0, a - b))
         return middle, start + middle[:, None] * along
 
-    middle, p = point()
-    value = evaluate(field, p)
-    first = (value < 0) == (a < 0)
-    s, a = np.where(first, middle, s), np.where(first, value, a)
-    t, b = np.where(first, t, middle), np.where(first, b, value)
+    for _ in range(2):
+        middle, p = point()
+        value = evaluate(field, p)
+        first = (value < 0) == (a < 0)
+        s, a = np.where(first, middle, s), np.where(first, value, a)
+        t, b = np.where(first, t, middle), np.where(first, b, value)
     return point()[1]
 
 

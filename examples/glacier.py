@@ -1,6 +1,6 @@
 """Writes the example scene: glacier spires on a block of ice, two rocks, snow, a cold sky and a warm light behind.
 
-    python examples/glacier.py -o out/glacier.usda [--detail 1.0] [--seed 3]
+    python examples/glacier.py -o out/glacier.usda [--detail 0.75] [--seed 3]
 
 Beside the stage lie its meshes (glacier_meshes.usdc), the sky (glacier_sky.exr) and two look-up images for the ice. A
 stage that is there already for the same detail, seed and scripts is left as it is.
@@ -66,7 +66,7 @@ def stamp(detail: float, seed: int) -> str:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("out/glacier.usda"), help="the stage to write")
-    parser.add_argument("--detail", type=float, default=1.0, help="finer meshes above 1, coarser below (0.05 .. 4)")
+    parser.add_argument("--detail", type=float, default=0.75, help="finer meshes above 1, coarser below (0.05 .. 4)")
     parser.add_argument("--seed", type=int, default=3, help="another number, another glacier")
     options = parser.parse_args(arguments)
     if options.output.suffix != ".usda":
