@@ -7,7 +7,7 @@ JOBS       ?= $(shell nproc)
 RESOLUTION ?= 960x540
 SAMPLES    ?= 32
 # Of the example's meshes: finer above 1. A scene that is there already for this detail is left as it is.
-DETAIL     ?= 1.0
+DETAIL     ?= 0.75
 OUT        ?= out
 
 STAMPS := $(VENV)/stamps

@@ -40,8 +40,8 @@ class Surface:
 
     def largest_piece(self) -> "Surface":
         """The connected piece with the most triangles: without the crumbs where thin tips slip through the grid."""
-        links = coo_matrix((np.ones(len(self.triangles)), (self.triangles[:, 0], self.triangles[:, 1])))
-        links.resize((len(self.positions),) * 2)
+        ends = self.triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+        links = coo_matrix((np.ones(len(ends)), ends.T), (len(self.positions),) * 2)
         _, piece = connected_components(links, directed=False)
         kept = piece == np.bincount(piece[self.triangles[:, 0]]).argmax()
         return Surface(self.positions[kept], (np.cumsum(kept) - 1)[self.triangles[kept[self.triangles[:, 0]]]])

@@ -1,6 +1,6 @@
 """Writes the example scene: glacier spires on a block of ice, two rocks, snow, a cold sky and a warm light behind.
 
-    python examples/glacier.py -o out/glacier.usda [--detail 1.0] [--seed 3]
+    python examples/glacier.py -o out/glacier.usda [--detail 0.75] [--seed 3]
 
 Beside the stage lie its meshes (glacier_meshes.usdc), the sky (glacier_sky.exr) and two look-up images for the ice. A
 stage that is there already for the same detail, seed and scripts is left as it is.
@@ -20,7 +20,7 @@ from scenery import Rock, Snow, make_snowfield
 from sky import make_sky, write_image
 from stage import SceneWriter
 
-kSun = np.array([-0.80, 0.34, -0.62])  # where the sun stands
+kSun = np.array([-0.90, 0.38, -0.42])  # where the sun stands
 kCell = 0.018  # metres between grid points at detail 1
 
 
@@ -37,8 +37,9 @@ def build(path: Path, detail: float, seed: int) -> None:
     frost = ice.frost(surface.positions, vertex_normals)
     writer.add_mesh("Ice", surface, normals, st=np.stack([frost, ice.layer(surface.positions)], 1))
 
-    snow = contour(Snow(ice), kLower, kUpper, 1.5 * cell)
-    writer.add_mesh("Snow", snow, corner_normals(snow, 80.0))
+    snow = Snow(ice)
+    drifts = contour(snow, *snow.bounds(), max(1.7 * cell, 0.02)).largest_piece()
+    writer.add_mesh("Snow", drifts, corner_normals(drifts, 80.0))
     for name, center, size in (("RockLeft", (-1.52, 0.34, 0.80), (0.36, 0.30, 0.30)),
                                ("RockRight", (2.02, 0.16, 0.92), (0.42, 0.34, 0.36))):  # fmt: skip
         rock = Rock(center, size, seed + len(name))
@@ -49,7 +50,7 @@ def build(path: Path, detail: float, seed: int) -> None:
     field = make_snowfield(ice, 60.0, max(20, int(150 * detail)), seed)
     writer.add_mesh("Snowfield", field, corner_normals(field, 80.0))
 
-    width = int(np.clip(2048 * detail, 256, 4096)) // 2 * 2
+    width = int(np.clip(1280 * detail, 256, 4096)) // 2 * 2
     write_image(path.with_name(path.stem + "_sky.exr"), make_sky(width, kSun, seed))
     writer.write(kSun, stamp(detail, seed))
 
@@ -65,7 +66,7 @@ def stamp(detail: float, seed: int) -> str:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("out/glacier.usda"), help="the stage to write")
-    parser.add_argument("--detail", type=float, default=1.0, help="finer meshes above 1, coarser below (0.05 .. 4)")
+    parser.add_argument("--detail", type=float, default=0.75, help="finer meshes above 1, coarser below (0.05 .. 4)")
     parser.add_argument("--seed", type=int, default=3, help="another number, another glacier")
     options = parser.parse_args(arguments)
     if options.output.suffix != ".usda":

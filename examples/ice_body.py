@@ -9,7 +9,7 @@ Not: snow, rocks and ground (see scenery.py).
 import numpy as np
 
 from noise import Noise, swirl
-from spires import Spire, bounds, distance, make_spire, smooth_min
+from spires import Spire, bounds, break_off, distance, make_spire, smooth_min
 
 kLower = np.array([-4.2, -0.4, -3.0])
 kUpper = np.array([4.2, 3.7, 2.6])
@@ -33,6 +33,8 @@ kShards = [
     (1.40, 0.58, 1.64, 0.82, 0.82, 0.32),
 ]
 
+kBroken = (4, 6, 9, 12)  # shards that have lost their tips
+
 
 class IceBody:
     """A field of the whole ice; `tips` (K, 3) are the points in which its shards end."""
@@ -40,12 +42,15 @@ class IceBody:
     def __init__(self, seed: int):
         rng = np.random.default_rng(seed)
         self.noise = Noise(seed)
-        self.shards = [make_spire(rng, (x, 0.1, z), (tx, ty, tz), r) for x, z, tx, ty, tz, r in kShards]
+        self.shards = []
+        for k, (x, z, tx, ty, tz, r) in enumerate(kShards):
+            broken = {"cut": break_off(rng, (x, 0.1, z), (tx, ty, tz))} if k in kBroken else {}
+            self.shards.append(make_spire(rng, (x, 0.1, z), (tx, ty, tz), r, **broken))
         self.shards += [self._splinter(rng) for _ in range(44)]
         angles = np.linspace(0, 2 * np.pi, 11, endpoint=False) + rng.uniform(-0.2, 0.2, 11)
         reach = rng.uniform(0.86, 1.06, 11)
         self._walls = np.stack([angles, reach, rng.uniform(-0.15, 0.22, 11)], 1)
-        self._cracks = [(_direction(rng), rng.uniform(-1.2, 1.2)) for _ in range(7)]
+        self._cracks = [(_direction(rng), rng.uniform(-1.2, 1.2)) for _ in range(11)]
         self.tips = self._find_tips()
 
     def _splinter(self, rng: np.random.Generator) -> Spire:
@@ -57,7 +62,8 @@ class IceBody:
         height = (parent.tip[1] - parent.base[1]) * rng.uniform(0.22, 0.52)
         lean = 0.5 * (parent.tip - parent.base) * [1, 0, 1] / max(parent.tip[1], 1.0) + out * rng.uniform(0.1, 0.4)
         tip = at + height * (np.array([0.0, 1.0, 0.0]) + lean)
-        return make_spire(rng, at, tip, height * rng.uniform(0.16, 0.25))
+        broken = {"cut": break_off(rng, at, tip)} if rng.random() < 0.3 else {}
+        return make_spire(rng, at, tip, height * rng.uniform(0.16, 0.25), **broken)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """The field (N,), negative inside, at points (N, 3)."""
@@ -81,11 +87,11 @@ class IceBody:
         for k, (direction, offset) in enumerate(self._cracks):
             side = bent @ direction - offset
             fan = np.clip(self.noise(points, 0.5, 60 + k) + 0.2, 0, 1)
-            crack = np.maximum(crack, np.maximum(np.exp(-np.abs(side) / 0.012), fan * _one_sided(side, 0.14)))
+            crack = np.maximum(crack, np.maximum(np.exp(-((side / 0.02) ** 2)), fan * _one_sided(side, 0.14)))
         bubbles = np.clip(self._layer(p) * 1.3 - 0.2, 0, 1) * np.clip(0.35 + self.noise(p, 0.7, 85), 0, 1) * 0.5
-        thin = np.clip(1.0 - thickness / 0.20, 0, 1) * 0.75
+        thin = np.clip(1.0 - thickness / 0.12, 0, 1) * 0.75
         mottle = np.clip(self.noise.fractal(points, 0.5, 4, 80) - 0.1, 0, 1) * 0.5
-        white = 1.0 - (1.0 - 0.9 * dust) * (1.0 - 0.85 * crack) * (1.0 - bubbles) * (1.0 - thin) * (1.0 - mottle)
+        white = 1.0 - (1.0 - 0.9 * dust) * (1.0 - 0.95 * crack) * (1.0 - bubbles) * (1.0 - thin) * (1.0 - mottle)
         return np.clip(white, 0.0, 1.0)
 
     def layer(self, points: np.ndarray) -> np.ndarray:
@@ -97,6 +103,7 @@ class IceBody:
 
     def _union(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d = self._block(p)
+        x, y, z = np.ascontiguousarray(p.T)
         thickness = np.full(len(p), 1.0)
         low, high = p.min(0), p.max(0)
         for shard in self.shards:
@@ -106,7 +113,10 @@ class IceBody:
             if gap > 0.3:
                 np.minimum(d, gap, out=d)
                 continue
-            box = np.maximum(a - p, p - b).max(1)
+            box = np.maximum(x - b[0], a[0] - x)
+            for k, column in ((1, y), (2, z)):
+                np.maximum(box, column - b[k], out=box)
+                np.maximum(box, a[k] - column, out=box)
             near = np.flatnonzero(box < 2.0 * kBlend)
             np.minimum(d, np.where(box < 2.0 * kBlend, np.inf, box), out=d)
             if len(near):
@@ -118,13 +128,14 @@ class IceBody:
     def _block(self, p: np.ndarray) -> np.ndarray:
         # A broken slab.
         x, y, z = p.T
-        floor = 0.36 + 0.08 * swirl(p * [1, 0, 1], 0.9)[:, 1] + 0.03 * x - 0.05 * z
+        floor = 0.34 + 0.11 * swirl(p * [1, 0, 1], 0.9)[:, 1] + 0.03 * x - 0.05 * z
+        rough = 0.09 * swirl(p * [1.0, 0.5, 1.0], 0.55, 5.0)[:, 1]
         d = np.maximum(y - floor, -0.15 - y)
         for angle, reach, lean in self._walls:
             n = np.array([np.cos(angle), np.sin(angle)])
             support = np.hypot(2.75 * n[0], 1.25 * n[1])
             out = (n[0] * x + n[1] * z - support * reach + lean * (y - 0.3)) / np.hypot(1.0, lean)
-            d = np.maximum(d, out)
+            d = np.maximum(d, out + rough)
         return d
 
     def _melt(self, points: np.ndarray, d: np.ndarray, thickness: np.ndarray) -> np.ndarray:
@@ -141,7 +152,7 @@ class IceBody:
         cut += 0.007 * np.clip(self._layer(p), -0.3, 1.0)
         bent = _crumple(p)
         for direction, offset in self._cracks:
-            cut += 0.016 * np.exp(-(((bent @ direction - offset) / 0.011) ** 2))
+            cut += 0.022 * np.exp(-(((bent @ direction - offset) / 0.014) ** 2))
         result[near] = cut * keep
         return result
 

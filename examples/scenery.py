@@ -1,7 +1,8 @@
 """What lies around the ice: rocks frozen into it, snow on its ledges, the snowfield below.
 
 Model: fields as in ice_body.py; snow is the ice lifted by the depth of the snow and kept where it rises out of the ice,
-    so that it lies on what faces up, thins out towards slopes, and leaves walls bare.
+    so that it lies on what faces up, thins out towards slopes, and leaves walls bare. Spires shed it: it ends above
+    the block.
 Units: metres, y up; fields are negative inside.
 Not: snow that has slid or drifted against walls.
 """
@@ -9,9 +10,10 @@ Not: snow that has slid or drifted against walls.
 import numpy as np
 
 from dual_contouring import Surface
-from ice_body import IceBody
+from ice_body import IceBody, kLower, kUpper
 from noise import Noise, swirl
 
+kSnowTop = 0.72  # metres above which no snow holds
 kSnowRoot = 0.05  # metres that snow reaches into the ice below
 
 
@@ -50,7 +52,7 @@ class Rock:
 class Snow:
     """A field of the snow that lies on the ice."""
 
-    def __init__(self, ice: IceBody, depth: float = 0.07):
+    def __init__(self, ice: IceBody, depth: float = 0.10):
         self._ice, self._depth = ice, depth
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -60,11 +62,15 @@ class Snow:
         near = np.flatnonzero((ice > -kSnowRoot - 0.03) & (ice < 3.0 * self._depth))
         p = points[near]
         patch = 0.75 + 0.45 * self._ice.noise(p, 0.42, 110)
-        high = np.clip(1.25 - 0.30 * p[:, 1], 0.35, 1.2)
+        high = np.clip((kSnowTop - p[:, 1]) / 0.3, 0.0, 1.0)
         depth = self._depth * np.clip(patch, 0.15, 1.2) * high
-        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + 0.62 * self._depth
+        snow = self._ice.bare(p - depth[:, None] * [0.0, 1.0, 0.0]) + self._depth * (1.0 - 0.42 * high)
         result[near] = np.maximum(snow, -(ice[near] + kSnowRoot))
-        return result
+        return np.maximum(result, points[:, 1] - kSnowTop)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """A box that holds the snow."""
+        return kLower, np.array([kUpper[0], kSnowTop + 0.15, kUpper[2]])
 
 
 def make_snowfield(ice: IceBody, extent: float, count: int, seed: int) -> Surface:

@@ -24,6 +24,7 @@ class Spire:
     twist: float  # radians from base to tip
     bend: np.ndarray  # sideways bulge half way up
     power: float  # 1 = straight sides, more = horn
+    cut: np.ndarray  # where it broke off: unit normal (3,) and offset; far away on a whole shard
 
 
 def make_spire(rng: np.random.Generator, base, tip, radius: float, **fixed) -> Spire:
@@ -36,23 +37,33 @@ def make_spire(rng: np.random.Generator, base, tip, radius: float, **fixed) -> S
             angles,
             rng.uniform(0.05, 0.24, count),
             rng.uniform(0.16, 0.36, count),
-            rng.choice([0.0, 0.03, 0.055], count),
+            rng.choice([0.0, 0.04, 0.075], count),
             rng.uniform(0, 1, count),
         ],
         1,
     )
     knots = np.concatenate([[0.0], np.sort(rng.uniform(0.12, 0.85, 4)), [1.0]])
-    offsets = rng.uniform(0.66, 0.95, (count, 1)) + rng.uniform(-0.16, 0.30, (count, len(knots)))
+    offsets = rng.uniform(0.66, 0.95, (count, 1)) + rng.uniform(-0.20, 0.36, (count, len(knots)))
     length = np.linalg.norm(tip - base)
     values = dict(
         faces=faces,
         knots=knots,
         offsets=offsets,
-        twist=rng.uniform(-0.7, 0.7),
-        bend=rng.uniform(-0.06, 0.06, 3) * length * [1, 0, 1],
-        power=rng.uniform(0.95, 1.25),
+        twist=rng.uniform(-0.9, 0.9),
+        bend=rng.uniform(-0.085, 0.085, 3) * length * [1, 0, 1],
+        power=rng.uniform(0.85, 1.3),
+        cut=np.array([0.0, 1.0, 0.0, 1e3]),
     )
     return Spire(base, tip, radius, **(values | fixed))
+
+
+def break_off(rng: np.random.Generator, base, tip) -> np.ndarray:
+    """A steep plane (4,) through the upper part of a shard, for its `cut`."""
+    turn = rng.uniform(0, 2 * np.pi)
+    normal = np.array([np.cos(turn), rng.uniform(0.45, 1.0), np.sin(turn)])
+    normal /= np.linalg.norm(normal)
+    through = np.asarray(base) + rng.uniform(0.5, 0.72) * (np.asarray(tip) - np.asarray(base))
+    return np.append(normal, normal @ through)
 
 
 def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,6 +97,7 @@ def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             cup = 2.0 * np.mod(across / width + phase + 0.6 * np.sin(5.0 * s + 9.0 * phase), 1.0) - 1.0
             out += wide * flute * (1.0 - cup * cup)
         np.maximum(result, out * slope, out=result)
+    np.maximum(result, points @ spire.cut[:3] - spire.cut[3], out=result)
     return np.maximum(result, -s * length - 0.1), np.maximum(radius, 0.0)
 
 

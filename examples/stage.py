@@ -18,8 +18,8 @@ kStampKey = "glacier:madeFrom"
 # Ice with bubbles; absorption of pure ice times about eight, as two metres have to show what a glacier shows in twenty.
 kIceScattering = (20.0, 20.0, 20.0)
 kIceAbsorption = (2.4, 0.40, 0.10)
-kClearTint = np.array([0.90, 1.00, 1.03])
-kWhiteTint = np.array([2.6, 1.50, 1.20])
+kClearTint = np.array([0.84, 1.02, 1.08])
+kWhiteTint = np.array([1.9, 1.52, 1.34])
 
 
 class SceneWriter:
@@ -92,7 +92,7 @@ class SceneWriter:
     def _add_materials(self, stage: Usd.Stage) -> dict[str, UsdShade.Material]:
         ice, shader = _material(stage, "Ice", "frazil:ice")
         _inputs(
-            shader, sigma_s_prime=kIceScattering, sigma_a=kIceAbsorption, eta=1.31, compensation="ratio", spacing=0.025
+            shader, sigma_s_prime=kIceScattering, sigma_a=kIceAbsorption, eta=1.31, compensation="ratio", spacing=0.04
         )
         reader = UsdShade.Shader.Define(stage, "/World/Materials/Ice/St")
         reader.CreateIdAttr("UsdPrimvarReader_float2")
@@ -112,9 +112,8 @@ class SceneWriter:
             )
             shader.CreateInput(name, getattr(Sdf.ValueTypeNames, kind)).ConnectToSource(value)
 
-        snow, shader = _material(stage, "Snow", "frazil:ice")
-        _inputs(shader, albedo=(0.90, 0.935, 0.96), mean_free_path=(0.012, 0.012, 0.012), roughness=0.55, eta=1.31,
-                specular=0.5, compensation="ratio", spacing=0.018)  # fmt: skip
+        snow, shader = _material(stage, "Snow", "UsdPreviewSurface")
+        _inputs(shader, diffuseColor=(0.86, 0.89, 0.93), roughness=0.7, ior=1.31)
 
         rock, shader = _material(stage, "Rock", "UsdPreviewSurface")
         _inputs(shader, roughness=0.42, ior=1.5)
@@ -134,7 +133,7 @@ class SceneWriter:
         dome.CreateIntensityAttr(1.25)
         dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
         distant = UsdLux.DistantLight.Define(stage, "/World/Lights/Sun")
-        distant.CreateAngleAttr(1.0)
+        distant.CreateAngleAttr(2.5)
         distant.CreateIntensityAttr(5.5)
         distant.CreateNormalizeAttr(True)
         distant.CreateColorAttr(Gf.Vec3f(1.0, 0.84, 0.66))
@@ -142,7 +141,7 @@ class SceneWriter:
         rim = UsdLux.RectLight.Define(stage, "/World/Lights/Rim")
         rim.CreateWidthAttr(0.8)
         rim.CreateHeightAttr(0.8)
-        rim.CreateIntensityAttr(45.0)
+        rim.CreateIntensityAttr(110.0)
         rim.CreateColorAttr(Gf.Vec3f(1.0, 0.62, 0.34))
         at, to = np.array([0.35, 1.05, -2.0]), np.array([0.1, 1.6, 0.0])
         rim.AddTransformOp().Set(_frame(at - to, at))
