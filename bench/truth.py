@@ -76,7 +76,9 @@ def main() -> None:
     truth, inside = reference["radiance"], reference["coverage"] == 1
     height, width = inside.shape
     print(f"{args.reference.stem}: {inside.sum()} pixels compared")
-    print("| compensation | bounces | RMS R G B, % | truth / render R G B | points | seconds |\n|---|---|---|---|---|---|")
+    print(
+        "| compensation | bounces | RMS R G B, % | truth / render R G B | points | seconds |\n|---|---|---|---|---|---|"
+    )
     for mode, bounces in itertools.product(MODES, args.bounces):
         start = time.perf_counter()
         film = fz.render(

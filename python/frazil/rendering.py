@@ -9,6 +9,7 @@ Not: reading scenes and writing files.
 import resource
 import sys
 import threading
+import warnings
 from collections.abc import Callable
 from datetime import datetime
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 from . import _frazil
 from .film import Film
 from .version import version
+from .warning import FrazilWarning
 
 __all__ = ["ESTIMATORS", "Progress", "render"]
 
@@ -114,6 +116,8 @@ def render(
     _refuse_what_cannot_fit(*resolution)
     result = _stoppable(lambda report: _frazil.render(scene, progress=report, **options), progress)
     stats = {**result.stats, "peak_memory": peak_memory()}
+    for message in stats["warnings"]:
+        warnings.warn(message, FrazilWarning, stacklevel=2)
     return Film(result.layers, _provenance(scene, options, stats), stats)
 
 

@@ -155,3 +155,20 @@ TEST_CASE("a stop that is asked for ends the render") {
     Progress progress({}, [] { return true; });
     CHECK_THROWS_AS(render(scene, small(), &progress), Cancelled);
 }
+
+TEST_CASE("default spacing gives a tiny body a thousand points, and a vast one is warned of") {
+    Scene scene = scene_of(sphere(1e-3f, 3), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
+    std::get<IceMaterial>(scene.materials[0].model).spacing = 0.0f;
+    scene.lights = {dome(Rgb(1.0f))};
+    RenderOptions options = small();
+    options.bake_samples = 1;
+    const RenderStats tiny = render(scene, options).stats;
+    CHECK(tiny.points > 700);
+    CHECK(tiny.warnings.empty());
+
+    std::get<IceMaterial>(scene.materials[0].model).medium.sigma_s_prime = Rgb(1e6f);
+    options.spacing = 1e-4f;
+    const RenderStats coarse = render(scene, options).stats;
+    REQUIRE(coarse.warnings.size() == 1);
+    CHECK(coarse.warnings[0].find("/shape: points are 0.0001 m apart") == 0);
+}

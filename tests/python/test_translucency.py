@@ -353,3 +353,21 @@ def test_hostile_positions(estimator):
 def test_bad_ramps(distances, colors, message):
     with pytest.raises(ValueError, match=message):
         fz.Ramp(distances, colors)
+
+
+@pytest.mark.parametrize("spacing", [0.04, 0.5, 2.0])
+def test_coarse_points_keep_the_coverage_right_on_average_and_never_negative(spacing):
+    """Spacing from 2 to 100 mean free paths: W is noisy, but its mean is Rd_total, however shading points are grouped."""
+    half = 8.0
+    corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
+    profile = fz.Dipole(fz.Medium.from_albedo((0.9, 0.93, 0.96), (0.02, 0.02, 0.02), 1.31))
+    points = fz.poisson_points(fz.Mesh(corners, [[0, 1, 2], [0, 2, 3]]), spacing)
+    tree = fz.PointTree(points, np.ones((len(points.positions), 3)), profile)
+    places = np.zeros((2000, 3), np.float32)
+    places[:, ::2] = np.random.default_rng(1).uniform(-0.5 * half, 0.5 * half, (2000, 2))
+    together = tree.gather(places).coverage / profile.albedo
+    alone = np.array([tree.gather(place[None]).coverage[0] for place in places[:300]]) / profile.albedo
+    assert together.min() >= 0
+    np.testing.assert_allclose(together.mean(axis=0), 1, atol=0.05)
+    np.testing.assert_allclose(alone.mean(axis=0), together[:300].mean(axis=0), atol=0.03)
+    assert alone.min() >= 0

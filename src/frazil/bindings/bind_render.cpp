@@ -50,6 +50,7 @@ nb::dict stats_of(const RenderStats& stats) {
     result["gathers"] = stats.gathers;
     result["dropped_samples"] = stats.dropped_samples;
     result["seconds"] = stats.seconds;
+    result["warnings"] = stats.warnings;
     return result;
 }
 

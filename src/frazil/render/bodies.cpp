@@ -12,7 +12,10 @@
 namespace frazil {
 namespace {
 
-constexpr double kPointsOfDefaultSpacing = 1e6;
+// How many points the default spacing may ask of one body, at most and at least.
+constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
+// Spacing over mean free path beyond which single points show.
+constexpr float kCoarse = 4.0f;
 
 // Lengths and angles of the matrix's axes: equal for matrices that differ by a rotation, reflection or move.
 std::array<float, 6> metric(const M44f& m) {
@@ -67,8 +70,9 @@ float point_spacing(const IceMaterial& material, double area, const RenderOption
     if (spacing == 0.0f) spacing = material.spacing;
     if (spacing == 0.0f) {
         const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
-        const double finest = std::sqrt(kPointsPerSpacing2 * area / kPointsOfDefaultSpacing);
-        spacing = std::max(1.0f / max_component(sigma_t_prime), static_cast<float>(finest));
+        const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);
+        const double coarsest = std::sqrt(kPointsPerSpacing2 * area / kFewestByDefault);
+        spacing = static_cast<float>(std::clamp(1.0 / max_component(sigma_t_prime), finest, coarsest));
     }
     return spacing * options.spacing_scale;
 }
@@ -111,6 +115,14 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene, const RayScen
         try {
             Stopwatch points_watch(stats.seconds["points"]);
             const float spacing = point_spacing(*material, area, options);
+            const float mean_free_path =
+                1.0f / max_component(material->medium.sigma_s_prime + material->medium.sigma_a);
+            if (spacing > kCoarse * mean_free_path) {
+                stats.warnings.push_back(
+                    str(object.path, ": points are ", spacing, " m apart, ", spacing / mean_free_path,
+                        " mean free paths: single points may show. Set the ",
+                        "material's spacing, or a longer mean free path for a body of this size."));
+            }
             lit[i].points = points_of(object, world_mesh, spacing, options.seed, shared, progress);
             points_watch.stop();
 

@@ -40,7 +40,7 @@ struct LitPoints {
 };
 
 // The spacing of an object's points: the render's, else the material's, else the shortest mean free path of a channel,
-// but never so fine that the object alone needs more than about a million points.
+// but so that the object alone has about a thousand points at least and a million at most.
 float point_spacing(const IceMaterial& material, double area, const RenderOptions& options);
 
 // One entry per object of the scene; null for those that are not ice. Fills points, nodes, bake rays and seconds of the

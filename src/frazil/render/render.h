@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "frazil/base/progress.h"
 #include "frazil/render/film.h"
@@ -35,6 +36,7 @@ struct RenderOptions {
 struct RenderStats {
     std::uint64_t points = 0, nodes = 0, camera_rays = 0, other_rays = 0, bake_rays = 0, gathers = 0;
     std::uint64_t dropped_samples = 0;      // NaN or infinite, left out of the film
+    std::vector<std::string> warnings;      // each begins with an object's path
     std::map<std::string, double> seconds;  // per stage: scene, points, bake, tree, render
 };
 

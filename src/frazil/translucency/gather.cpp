@@ -59,10 +59,11 @@ struct Cut {
     }
 
     // A disc of surface of area A * share about a point.
-    void add_disc(std::uint32_t p, const V3f& center, float share) {
+    void add_disc(std::uint32_t p, const V3f& center, float share, float largest_squared) {
         const float area = tree.areas[p] * share;
         const V3f& n = tree.normals[p];
-        const float v = has_footprints ? 0.25f * area * kInvPi : 0.0f;
+        // The second moments of a disc; of one that stays too large for them, those of the largest that they hold for.
+        const float v = has_footprints ? std::min(0.25f * area * kInvPi, 0.25f * largest_squared) : 0.0f;
         list.sources.push_back({{center.x, center.y, center.z},
                                 {v * (1.0f - n.x * n.x), v * (1.0f - n.y * n.y), v * (1.0f - n.z * n.z),
                                  -2.0f * v * n.x * n.y, -2.0f * v * n.x * n.z, -2.0f * v * n.y * n.z},
@@ -76,7 +77,7 @@ struct Cut {
     // A disc that is large against the kernel is cut into seven of equal area with the same second moments together.
     void add_split_disc(std::uint32_t p, const V3f& center, float share, float largest_squared) {
         const float squared = tree.areas[p] * share * kInvPi;  // of the radius; the trace is half of it
-        if (squared <= largest_squared || share < 1e-3f) return add_disc(p, center, share);
+        if (squared <= largest_squared || share < 1e-3f) return add_disc(p, center, share, largest_squared);
         const auto [tangent, bitangent] = tangent_frame(tree.normals[p]);
         add_split_disc(p, center, share / 7.0f, largest_squared);
         for (int k = 0; k < 6; ++k) {
@@ -89,10 +90,13 @@ struct Cut {
     void add_points(const TreeNode& leaf, const Box3f& box) {
         for (std::uint32_t p = leaf.first; p < leaf.first + leaf.size(); ++p) {
             if (has_footprints) {
-                const float q = squared_distance(box, tree.positions[p]);
+                // From the disc's rim: what stands on a disc is nearest to its middle pieces.
+                const float radius = std::sqrt(tree.areas[p] * kInvPi);
+                const float distance = std::max(0.0f, std::sqrt(squared_distance(box, tree.positions[p])) - radius);
+                const float q = distance * distance;
                 add_split_disc(p, tree.positions[p], 1.0f, kDiscShare * rule->largest_squared(q));
             } else {
-                add_disc(p, tree.positions[p], 1.0f);
+                add_disc(p, tree.positions[p], 1.0f, 0.0f);
             }
         }
     }
