@@ -1,4 +1,4 @@
-"""Frazil against path-traced truth: relative RMS error per channel, by mode of the area compensation and number of bounces.
+"""Frazil against path-traced truth: relative RMS error by compensation mode and number of bounces.
 
 A reference is an .npz with `radiance` (H, W, 3), `coverage` (H, W) and `params`, a JSON text: mesh, sigma_s_prime and
 sigma_a in 1/unit, env (radiance from all around), light [centre, target, half size, radiance], camera [origin, target],

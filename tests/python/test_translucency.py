@@ -357,7 +357,7 @@ def test_bad_ramps(distances, colors, message):
 
 @pytest.mark.parametrize("spacing", [0.04, 0.5, 2.0])
 def test_coarse_points_keep_the_coverage_right_on_average_and_never_negative(spacing):
-    """Spacing from 2 to 100 mean free paths: W is noisy, but its mean is Rd_total, however shading points are grouped."""
+    """Spacing of 2 to 100 mean free paths: W is noisy, but its mean is Rd_total however shading points are grouped."""
     half = 8.0
     corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]])
     profile = fz.Dipole(fz.Medium.from_albedo((0.9, 0.93, 0.96), (0.02, 0.02, 0.02), 1.31))
