@@ -17,7 +17,17 @@ __all__ = ["PROGRESS_KINDS", "make_progress"]
 PROGRESS_KINDS = ("bar", "farm", "none")
 
 # In the order in which they run; a stage that is not named here leaves the number as it is.
-_WEIGHTS = {"load": 3.0, "scene": 2.0, "points": 6.0, "bake": 12.0, "tree": 2.0, "render": 73.0, "save": 2.0}
+_WEIGHTS = {
+    "load": 3.0,
+    "scene": 2.0,
+    "points": 4.0,
+    "areas": 2.0,
+    "bake": 10.0,
+    "bounce": 6.0,
+    "tree": 1.0,
+    "render": 70.0,
+    "save": 2.0,
+}
 
 
 class _Overall:
