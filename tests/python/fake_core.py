@@ -50,7 +50,13 @@ class Core:
                 progress(stage, (step + 1) / self.steps)
                 if self.on_step:
                     self.on_step(stage, step)
-        stats = {"points": 10, "nodes": 3, "dropped_samples": 2, "warnings": [], "seconds": {"points": 0.1, "render": 0.2}}
+        stats = {
+            "points": 10,
+            "nodes": 3,
+            "dropped_samples": 2,
+            "warnings": [],
+            "seconds": {"points": 0.1, "render": 0.2},
+        }
         return SimpleNamespace(layers=layers(options["width"], options["height"]), stats=stats)
 
 
