@@ -1,8 +1,11 @@
 """Stages: units, up axis, time, cameras, render settings, usdz."""
 
+import subprocess
+import sys
 import warnings
 
 import numpy as np
+import OpenImageIO
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdUtils
 from usd_stages import add_quad, load, new_stage, world_positions
@@ -283,3 +286,33 @@ def test_render_settings_that_are_not_honoured_are_named(tmp_path):
     said = "\n".join(load(stage).warnings)
     for what in ("pixelAspectRatio 2", "dataWindowNDC", "asks for proxy", "/Product: productName"):
         assert what in said
+
+
+def test_the_first_product_chooses_resolution_camera_and_layers(tmp_path):
+    stage = new_stage(tmp_path / "s.usda")
+    add_quad(stage, "/Quad")
+    for name in ("Wide", "Near"):
+        UsdGeom.Camera.Define(stage, f"/{name}").AddTranslateOp().Set(Gf.Vec3d(0, 0, 5))
+    settings = UsdRender.Settings.Define(stage, "/Settings")
+    settings.CreateResolutionAttr(Gf.Vec2i(64, 32))
+    settings.CreateCameraRel().SetTargets(["/Wide"])
+    product = UsdRender.Product.Define(stage, "/Product")
+    product.CreateResolutionAttr(Gf.Vec2i(20, 10))
+    product.CreateCameraRel().SetTargets(["/Near"])
+    for name, source in (("Color", "Ci"), ("Glow", "translucency"), ("Odd", "velvet")):
+        UsdRender.Var.Define(stage, f"/Vars/{name}").CreateSourceNameAttr(source)
+    product.CreateOrderedVarsRel().SetTargets(["/Vars/Color", "/Vars/Glow", "/Vars/Odd"])
+    settings.CreateProductsRel().SetTargets(["/Product"])
+    stage.Save()
+
+    out = tmp_path / "s.exr"
+    arguments = [tmp_path / "s.usda", "-o", out, "--samples", "1", "--quiet"]
+    done = subprocess.run(
+        [sys.executable, "-m", "frazil.cli", "render", *map(str, arguments)], capture_output=True, text=True
+    )
+    assert done.returncode == 0
+    assert "frazil: warning: /Vars/Odd: sourceName 'velvet' is no layer." in done.stderr
+    image = OpenImageIO.ImageBuf(str(out))
+    assert (image.spec().width, image.spec().height) == (20, 10)
+    assert image.spec().getattribute("frazil:camera") == "/Near"
+    assert set(image.spec().channelnames) == {"R", "G", "B", "A", "translucency.R", "translucency.G", "translucency.B"}

@@ -3,12 +3,14 @@
 import json
 import math
 import time
+import warnings
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from ..warning import FrazilWarning
 from .frames import fill_pattern, has_pattern, parse_frames, parse_resolution
 from .progress import PROGRESS_KINDS, make_progress
 
@@ -80,7 +82,11 @@ def render_command(
         str, typer.Option(metavar="NAME", help="Of the EXR: none, rle, zip, zips, piz, pxr24, b44, b44a, dwaa, dwab.")
     ] = "zips",
     aov: Annotated[
-        list[str] | None, typer.Option(metavar="LAYER", help="Write only these layers (repeat it, or comma between).")
+        list[str] | None,
+        typer.Option(
+            metavar="LAYER",
+            help="Write only these layers (repeat it, or comma between). Default: the stage's render vars, else all.",
+        ),
     ] = None,
     png: Annotated[
         Path | None, typer.Option("--png", metavar="OUT.png", help="The preview. Default: beside the EXR.")
@@ -151,7 +157,7 @@ def render_command(
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
 
             start = time.perf_counter()
-            film.save(exr, compression, layers=layers)
+            film.save(exr, compression, layers=layers or _authored_layers(loaded))
             if preview is not None:
                 film.save_preview(preview)
             records.append(_record(film, time_code, exr, seconds_load, time.perf_counter() - start))
@@ -221,7 +227,38 @@ def _refuse_unwritable(*paths: Path | None) -> None:
 def _authored_resolution(loaded: Any) -> tuple[int, int]:
     """The resolution that the stage's render settings ask for, else the default."""
     settings = loaded.render_settings
-    return (settings and settings.resolution) or DEFAULT_RESOLUTION
+    return (settings and settings.product.resolution) or DEFAULT_RESOLUTION
+
+
+# Names that other renderers' render vars have for our layers.
+_LAYER_OF_VAR = {
+    "color": "beauty",
+    "C": "beauty",
+    "Ci": "beauty",
+    "rgba": "beauty",
+    "depth": "Z",
+    "z": "Z",
+    "normal": "N",
+}
+
+
+def _authored_layers(loaded: Any) -> list[str] | None:
+    """The layers that the stage's render vars ask for, the beauty first; None for all, where there are no vars."""
+    settings = loaded.render_settings
+    if not settings or not settings.product.vars:
+        return None
+    from .._frazil import aov_table
+
+    known = {row["name"] for row in aov_table()}
+    layers = ["beauty"]
+    for var in settings.product.vars:
+        name = _LAYER_OF_VAR.get(var.source_name, var.source_name)
+        if name in known:
+            layers.append(name)
+        else:
+            message = f"{var.path}: sourceName '{var.source_name}' is no layer. There are {', '.join(sorted(known))}."
+            warnings.warn(message, FrazilWarning, stacklevel=2)
+    return list(dict.fromkeys(layers))
 
 
 # ---- what is told ----------------------------------------------------------------------------------------------------

@@ -40,6 +40,11 @@ class RenderSettings:
     data_window: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     products: list[RenderProduct] = field(default_factory=list)
 
+    @property
+    def product(self) -> RenderProduct:
+        """The one that is rendered: the first, or one that asks for what the settings ask for."""
+        return self.products[0] if self.products else RenderProduct(self.path, "", self.resolution, self.camera)
+
 
 def read_render_settings(context: ReadContext) -> RenderSettings | None:
     """The stage's render settings: those that its metadata name, else the only ones; None where there are none."""
@@ -85,13 +90,11 @@ def _warn_of_unsupported(context: ReadContext, settings: UsdRender.Settings, rea
     if purposes and not set(purposes) <= context.purposes:
         left_out = ", ".join(sorted(set(purposes) - context.purposes))
         context.warn(path, f"includedPurposes asks for {left_out}, which is left out. Load with these purposes.")
-    for product in read.products:
-        if (product.resolution, product.camera) != (read.resolution, read.camera):
-            context.warn(product.path, "has a resolution or camera of its own. Those of the render settings are used.")
-        if product.name or product.vars:
-            context.warn(
-                product.path, "productName and orderedVars do not choose the output. The caller names file and layers."
-            )
+    for product in read.products[1:]:
+        context.warn(product.path, "is left out: one product is rendered, the first.")
+    for product in read.products[:1]:
+        if product.name:
+            context.warn(product.path, f"productName '{product.name}' is not used. The caller names the file.")
 
 
 def _read_product(context: ReadContext, product: UsdRender.Product, resolution, camera) -> RenderProduct:

@@ -88,7 +88,7 @@ def load_usd(
     if not scene.lights:
         add_grey_dome(context, scene)
     settings = read_render_settings(context)
-    scene.camera = choose_camera(context, scene, camera, settings.camera if settings else None)
+    scene.camera = choose_camera(context, scene, camera, settings.product.camera if settings else None)
     _pass_on(context, diagnostics)
     scene.file = context.file
     scene.frame = None if context.time.IsDefault() or context.time.IsEarliestTime() else context.time.GetValue()
