@@ -12,6 +12,8 @@
 namespace frazil {
 namespace {
 
+// In mean free paths. Halving it takes the error of a bunny's translucency from 1.5 % to 0.6 %.
+constexpr double kDefaultSpacing = 0.5;
 // How many points the default spacing may ask of one body, at most and at least.
 constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
 // Spacing over mean free path beyond which single points show.
@@ -72,7 +74,7 @@ float point_spacing(const IceMaterial& material, double area, const RenderOption
         const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
         const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);
         const double coarsest = std::sqrt(kPointsPerSpacing2 * area / kFewestByDefault);
-        spacing = static_cast<float>(std::clamp(1.0 / max_component(sigma_t_prime), finest, coarsest));
+        spacing = static_cast<float>(std::clamp(kDefaultSpacing / max_component(sigma_t_prime), finest, coarsest));
     }
     return spacing * options.spacing_scale;
 }

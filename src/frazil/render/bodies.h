@@ -39,8 +39,8 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
-// The spacing of an object's points: the render's, else the material's, else the shortest mean free path of a channel,
-// but so that the object alone has about a thousand points at least and a million at most.
+// The spacing of an object's points: the render's, else the material's, else half the shortest mean free path of a
+// channel, but so that the object alone has about a thousand points at least and a million at most.
 float point_spacing(const IceMaterial& material, double area, const RenderOptions& options);
 
 // One entry per object of the scene; null for those that are not ice. Fills points, nodes, bake rays and seconds of the
