@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from frazil.usd.settings import RenderSettings
+
 AOVS = [
     ("beauty", "RGBA", False, True),
     ("translucency", "RGB", True, True),
@@ -67,7 +69,7 @@ def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"
         frame=frame,
         camera=SimpleNamespace(path=camera, matrix=CAMERA_TO_WORLD),
         objects=[SimpleNamespace(path="/World/Ice"), SimpleNamespace(path="/World/Rock")],
-        render_settings=SimpleNamespace(resolution=resolution),
+        render_settings=RenderSettings("/Settings", resolution),
     )
 
 
