@@ -83,11 +83,11 @@ def _temporary_prefix(target: Path) -> str:
 
 
 def _remove_leftovers(target: Path) -> None:
-    # A process that was killed leaves its temporary; only this machine can tell that the process is gone.
+    # A process that was killed leaves its temporary or its probe; only this machine can tell that the process is gone.
     prefix = _temporary_prefix(target)
-    for leftover in target.parent.glob(f"{_escaped(prefix)}*.tmp"):
-        pid = leftover.name[len(prefix) : -len(".tmp")]
-        if pid.isdigit() and not Path(f"/proc/{pid}").exists():
+    for leftover in target.parent.glob(f"{_escaped(prefix)}*"):
+        pid, _, kind = leftover.name[len(prefix) :].partition(".")
+        if kind in ("tmp", "probe") and pid.isdigit() and not Path(f"/proc/{pid}").exists():
             leftover.unlink(missing_ok=True)
 
 

@@ -4,6 +4,7 @@ import os
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -147,3 +148,15 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path):
     # What the dead left is swept away by the next writer.
     write_old(path)
     assert os.listdir(tmp_path) == ["a.exr"]
+
+
+def test_a_dead_writers_probe_is_swept_away_and_a_living_ones_is_not(tmp_path):
+    path = tmp_path / "a.exr"
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    host = socket.gethostname()
+    living = f".a.exr.{host}-{os.getppid()}.probe"
+    for name in (f".a.exr.{host}-{gone.pid}.probe", f".a.exr.{host}-{gone.pid}.tmp", living):
+        (tmp_path / name).touch()
+    write_old(path)
+    assert sorted(os.listdir(tmp_path)) == sorted([living, "a.exr"])
