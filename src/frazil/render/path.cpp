@@ -88,7 +88,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         if (!has_primary) {
             has_primary = true;
             const float depth = (surface.position - camera_ray.origin).dot(view_axis);
-            tile.add_primary(pixel, {depth, surface.position, surface.normal, surface.object + 1});
+            tile.add_primary(pixel, {depth, surface.position, surface.normal, shader.albedo(wo), surface.object + 1});
         }
 
         // What the surface itself gives: emission, and light that diffused through ice.
@@ -199,6 +199,7 @@ void PathTracer::request_gather(const Path& path, const Surface& surface, const 
     GatherRequest request;
     request.object = surface.object;
     request.pixel = path.pixel;
+    request.subset = tile.subset;
     request.position = surface.position;
     request.is_primary = path.bounce == 0;
     if (request.is_primary) {
@@ -243,6 +244,7 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
+            tile.subset = request.subset;
             const Rgb& coverage = gathered.coverage[i - begin];
             const Compensation& compensation = body.material->compensation;
             const Rgb gain = compensation_gain(compensation, coverage, body.total_reflectance);
