@@ -767,10 +767,10 @@ class Light:
     matrix : (4, 4) float64 light to world, for row vectors; None = identity.
     path : name for messages. group : light group, '' = the default one.
     normalize : divide by the light's area in square metres.
-    diffuse, specular, translucency : multipliers of what the light does to each component.
+    diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.
     """
 
-    def __init__(self, shape: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, *, radiance: Sequence[float] = [1.0, 1.0, 1.0], matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, path: str = 'Light', group: str = '', normalize: bool = False, diffuse: float = 1.0, specular: float = 1.0, translucency: float = 1.0) -> None: ...
+    def __init__(self, shape: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, *, radiance: Sequence[float] = [1.0, 1.0, 1.0], matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, path: str = 'Light', group: str = '', normalize: bool = False, diffuse: float = 1.0, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, volume: float = 1.0) -> None: ...
 
     @property
     def path(self) -> str: ...
@@ -816,6 +816,12 @@ class Light:
 
     @property
     def translucency(self) -> float: ...
+
+    @property
+    def refraction(self) -> float: ...
+
+    @property
+    def volume(self) -> float: ...
 
     def __repr__(self) -> str: ...
 

@@ -33,7 +33,8 @@ def test_radiance_is_the_product_of_its_inputs(stage):
     light.CreateNormalizeAttr(True)
     light.CreateDiffuseAttr(0.5)
     light.CreateSpecularAttr(0.25)
-    light.GetPrim().CreateAttribute("inputs:frazil:translucency", Sdf.ValueTypeNames.Float).Set(2.0)
+    for name, value in (("translucency", 2.0), ("refraction", 3.0), ("volume", -4.0)):
+        light.GetPrim().CreateAttribute(f"inputs:frazil:{name}", Sdf.ValueTypeNames.Float).Set(value)
     light.GetPrim().CreateAttribute("frazil:lightGroup", Sdf.ValueTypeNames.Token).Set("rim")
     light.AddTranslateOp().Set(Gf.Vec3d(100, 0, 0))
     read = read_light(stage)
@@ -41,6 +42,7 @@ def test_radiance_is_the_product_of_its_inputs(stage):
     assert (read.shape.width, read.shape.height) == (20, 30)
     assert read.normalize
     assert (read.diffuse, read.specular, read.translucency) == (0.5, 0.25, 2.0)
+    assert (read.refraction, read.volume) == (3.0, -4.0)
     assert read.group == "rim"
     np.testing.assert_allclose(read.matrix[3, :3], [1, 0, 0], rtol=1e-6)
     np.testing.assert_allclose(read.matrix[0, 0], 0.01, rtol=1e-6)

@@ -59,6 +59,8 @@ def add_light(context: ReadContext, scene: Scene, prim: Usd.Prim, matrix: np.nda
             diffuse=_number(context, prim, "diffuse", 1.0),
             specular=_number(context, prim, "specular", 1.0),
             translucency=_number(context, prim, "frazil:translucency", 1.0),
+            refraction=_number(context, prim, "frazil:refraction", 1.0),
+            volume=_number(context, prim, "frazil:volume", 1.0),
         )
     )
 

@@ -86,30 +86,32 @@ void bind_lights(nb::module_& module) {
         .def_rw("length", &CylinderLight::length)
         .def_rw("radius", &CylinderLight::radius);
 
-    nb::class_<Light>(module, "Light",
-                      "A light of the scene.\n\n"
-                      "Parameters\n----------\n"
-                      "shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.\n"
-                      "radiance : RGB, the product of intensity, exposure, colour and colour temperature.\n"
-                      "matrix : (4, 4) float64 light to world, for row vectors; None = identity.\n"
-                      "path : name for messages. group : light group, '' = the default one.\n"
-                      "normalize : divide by the light's area in square metres.\n"
-                      "diffuse, specular, translucency : multipliers of what the light does to each component.")
+    nb::class_<Light>(
+        module, "Light",
+        "A light of the scene.\n\n"
+        "Parameters\n----------\n"
+        "shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.\n"
+        "radiance : RGB, the product of intensity, exposure, colour and colour temperature.\n"
+        "matrix : (4, 4) float64 light to world, for row vectors; None = identity.\n"
+        "path : name for messages. group : light group, '' = the default one.\n"
+        "normalize : divide by the light's area in square metres.\n"
+        "diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.")
         .def(
             "__init__",
             [](Light* self, LightShape shape, const Triple& radiance, const std::optional<MatrixArray>& matrix,
                const std::string& path, const std::string& group, bool normalize, float diffuse, float specular,
-               float translucency) {
+               float translucency, float refraction, float volume) {
                 new (self) Light{path,
                                  group,
                                  std::move(shape),
                                  Rgb(radiance[0], radiance[1], radiance[2]),
                                  normalize,
                                  to_matrix_or_identity(matrix),
-                                 {diffuse, specular, translucency}};
+                                 {diffuse, specular, translucency, refraction, volume}};
             },
             "shape"_a, nb::kw_only(), "radiance"_a = Triple{1, 1, 1}, "matrix"_a = nb::none(), "path"_a = "Light",
-            "group"_a = "", "normalize"_a = false, "diffuse"_a = 1.0f, "specular"_a = 1.0f, "translucency"_a = 1.0f)
+            "group"_a = "", "normalize"_a = false, "diffuse"_a = 1.0f, "specular"_a = 1.0f, "translucency"_a = 1.0f,
+            "refraction"_a = 1.0f, "volume"_a = 1.0f)
         .def_rw("path", &Light::path)
         .def_rw("group", &Light::group)
         .def_rw("shape", &Light::shape)
@@ -127,6 +129,9 @@ void bind_lights(nb::module_& module) {
         .def_prop_ro("specular", [](const Light& light) { return light.multipliers[int(LightComponent::specular)]; })
         .def_prop_ro("translucency",
                      [](const Light& light) { return light.multipliers[int(LightComponent::translucency)]; })
+        .def_prop_ro("refraction",
+                     [](const Light& light) { return light.multipliers[int(LightComponent::refraction)]; })
+        .def_prop_ro("volume", [](const Light& light) { return light.multipliers[int(LightComponent::volume)]; })
         .def("__repr__", [](const Light& light) {
             constexpr const char* kShapes[] = {"dome", "distant", "rect", "disk", "sphere", "cylinder"};
             return str("Light(", light.path, ", ", kShapes[light.shape.index()], ", radiance=(", light.radiance.x, ", ",

@@ -41,8 +41,8 @@ struct CylinderLight {
 using LightShape = std::variant<DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight>;
 
 // The components that a light can be told to act on; each light has one multiplier per component.
-enum class LightComponent { diffuse, specular, translucency };
-inline constexpr int kLightComponentCount = 3;
+enum class LightComponent { diffuse, specular, translucency, refraction, volume };
+inline constexpr int kLightComponentCount = 5;
 
 struct Light {
     std::string path;
@@ -51,7 +51,7 @@ struct Light {
     Rgb radiance = Rgb(1.0f);  // final, `normalize` not yet applied
     bool normalize = false;
     M44f light_to_world;
-    float multipliers[kLightComponentCount] = {1.0f, 1.0f, 1.0f};
+    float multipliers[kLightComponentCount] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 };
 
 // Refuse non-finite values and sizes out of range: ValueError beginning with the light's path.
