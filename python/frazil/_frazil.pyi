@@ -1,5 +1,5 @@
-from collections.abc import Callable, Sequence
-from typing import Annotated
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, overload
 
 import numpy
 import numpy.typing
@@ -982,6 +982,133 @@ class Scene:
 
     def __repr__(self) -> str: ...
 
+class RenderOptions:
+    """What a render is asked for; see frazil.render for each."""
+
+    def __init__(self) -> None: ...
+
+    @property
+    def width(self) -> int: ...
+
+    @width.setter
+    def width(self, arg: int, /) -> None: ...
+
+    @property
+    def height(self) -> int: ...
+
+    @height.setter
+    def height(self, arg: int, /) -> None: ...
+
+    @property
+    def samples(self) -> int: ...
+
+    @samples.setter
+    def samples(self, arg: int, /) -> None: ...
+
+    @property
+    def noise(self) -> float: ...
+
+    @noise.setter
+    def noise(self, arg: float, /) -> None: ...
+
+    @property
+    def min_samples(self) -> int: ...
+
+    @min_samples.setter
+    def min_samples(self, arg: int, /) -> None: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @seed.setter
+    def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def threads(self) -> int: ...
+
+    @threads.setter
+    def threads(self, arg: int, /) -> None: ...
+
+    @property
+    def max_bounces(self) -> int: ...
+
+    @max_bounces.setter
+    def max_bounces(self, arg: int, /) -> None: ...
+
+    @property
+    def spacing(self) -> float: ...
+
+    @spacing.setter
+    def spacing(self, arg: float, /) -> None: ...
+
+    @property
+    def spacing_scale(self) -> float: ...
+
+    @spacing_scale.setter
+    def spacing_scale(self, arg: float, /) -> None: ...
+
+    @property
+    def bake_samples(self) -> int: ...
+
+    @bake_samples.setter
+    def bake_samples(self, arg: int, /) -> None: ...
+
+    @property
+    def bake_bounces(self) -> int: ...
+
+    @bake_bounces.setter
+    def bake_bounces(self, arg: int, /) -> None: ...
+
+    @property
+    def tolerance(self) -> float: ...
+
+    @tolerance.setter
+    def tolerance(self, arg: float, /) -> None: ...
+
+    @property
+    def estimator(self) -> str: ...
+
+    @estimator.setter
+    def estimator(self, arg: str, /) -> None: ...
+
+    @property
+    def filter(self) -> str: ...
+
+    @filter.setter
+    def filter(self, arg: str, /) -> None: ...
+
+class Bake:
+    """
+    Points and light of every translucent body of a scene: what serves all cameras and frames that
+    show the same shapes under the same lights.
+    """
+
+    @overload
+    def __init__(self) -> None:
+        """A bake of nothing."""
+
+    @overload
+    def __init__(self, groups: Sequence[str]) -> None:
+        """A bake of these light groups, without objects yet."""
+
+    @property
+    def groups(self) -> list[str]:
+        """The light groups."""
+
+    def __len__(self) -> int:
+        """Objects of the scene."""
+
+    def points(self, index: int) -> PointSet:
+        """The PointSet of an object; empty where it is not ice."""
+
+    def irradiance(self, index: int) -> NDArray[numpy.float32]:
+        """
+        (N, G, 3) float32: light that enters an object's points, per light group.
+        """
+
+    def append(self, points: PointSet, irradiance: numpy.typing.ArrayLike) -> None:
+        """Add the next object (copied)."""
+
 class RenderResult:
     """What a render gives: layers and statistics."""
 
@@ -997,11 +1124,28 @@ class RenderResult:
         dict: points, nodes, rays, gathers, dropped samples, seconds per stage.
         """
 
+class BakeResult:
+    """What a bake gives: itself and statistics."""
+
+    @property
+    def bake(self) -> Bake: ...
+
+    @property
+    def stats(self) -> dict:
+        """As of a render."""
+
 def aov_table() -> list:
     """The AOV table: a list of dicts (name, channels, meaning, filter, ...)."""
 
-def render(scene: Scene, *, width: int = 960, height: int = 540, samples: int = 32, seed: int = 0, threads: int = 0, filter: str = 'blackman_harris', max_bounces: int = 4, spacing: float = 0.0, spacing_scale: float = 1.0, bake_samples: int = 64, bake_bounces: int = 1, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', progress: object | None = None) -> RenderResult:
+def render(scene: Scene, options: RenderOptions, *, progress: object | None = None, bake: Bake | None = None, checkpoint: object | None = None, checkpoint_seconds: float = 0.0, resume: Mapping[str, numpy.typing.ArrayLike] | None = None) -> RenderResult:
     """
     Render a scene; see frazil.render. progress(stage, fraction) is called now and then from any thread;
-    an exception that it raises stops the render.
+    an exception that it raises stops the render. checkpoint(state) gets a dict of float32 arrays every
+    checkpoint_seconds (0: never) and when the render is stopped; `resume` takes such a dict.
+    """
+
+def bake(scene: Scene, options: RenderOptions, *, known: Bake | None = None, progress: object | None = None) -> BakeResult:
+    """
+    Points and light of a scene's translucent bodies; what is `known` (points of objects that have some, light
+    of the groups that are named) is taken over.
     """

@@ -97,8 +97,8 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
 // Light that enters all points, by way of these lights alone.
 std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                                           const std::vector<std::unique_ptr<Body>>& bodies,
-                                          const RenderOptions& options, std::vector<LitPoints>& lit,
-                                          RenderStats& stats, Progress* progress) {
+                                          const RenderOptions& options, std::vector<LitPoints>& lit, RenderStats& stats,
+                                          Progress* progress) {
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         Stopwatch watch(stats.seconds["bake"]);

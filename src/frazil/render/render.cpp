@@ -50,7 +50,8 @@ class Canvas {
         int x0, y0, x1, y1;
     };
     Region region(std::size_t tile) const {
-        const int x0 = static_cast<int>(tile % tiles_x_) * kTileSize, y0 = static_cast<int>(tile / tiles_x_) * kTileSize;
+        const int x0 = static_cast<int>(tile % tiles_x_) * kTileSize,
+                  y0 = static_cast<int>(tile / tiles_x_) * kTileSize;
         return {x0, y0, std::min(x0 + kTileSize, options_.width), std::min(y0 + kTileSize, options_.height)};
     }
     std::size_t film_pixel(int x, int y) const { return std::size_t(y) * options_.width + x; }
@@ -117,8 +118,7 @@ class Canvas {
             const auto found = saved.find(name);
             if (found == saved.end() || found->second.size() != own.size()) {
                 throw ValueError(str("checkpoint: ", name, " must have ", own.size(), " values, got ",
-                                     found == saved.end() ? 0 : found->second.size(),
-                                     ". Render without resuming."));
+                                     found == saved.end() ? 0 : found->second.size(), ". Render without resuming."));
             }
             std::copy(found->second.begin(), found->second.end(), own.begin());
         }
@@ -274,8 +274,7 @@ RenderResult render(const Scene& scene, const RenderOptions& options, Progress* 
                     const Checkpoints* checkpoints) {
     check_options(options);
     check_scene(scene);
-    return with_threads(options.threads,
-                        [&] { return render_in_arena(scene, options, progress, baked, checkpoints); });
+    return with_threads(options.threads, [&] { return render_in_arena(scene, options, progress, baked, checkpoints); });
 }
 
 }  // namespace frazil

@@ -9,8 +9,8 @@ Shader::Shader(const Surface& surface, const Body* body)
     std::tie(tangent_, bitangent_) = tangent_frame(normal_);
     if (body_) {
         alpha_ = alpha_from_roughness(eval_float(body_->material->roughness, surface.st));
-        core_albedo_ = body_->total_reflectance * eval_color(body_->material->tint, surface.st) *
-                       body_->material->translucency;
+        core_albedo_ =
+            body_->total_reflectance * eval_color(body_->material->tint, surface.st) * body_->material->translucency;
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
         standard_.emplace(material, surface.st, surface.display_color);

@@ -42,7 +42,7 @@ class Shader {
     V3f geometric_normal_, normal_, tangent_, bitangent_;
     std::optional<StandardBsdf> standard_;
     const Body* body_ = nullptr;
-    float alpha_ = 0.0f;  // of the ice's boundary
+    float alpha_ = 0.0f;           // of the ice's boundary
     Rgb core_albedo_ = Rgb(0.0f);  // of the ice under its boundary
 };
 
