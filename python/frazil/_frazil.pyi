@@ -116,6 +116,9 @@ class PointSet:
     Points on a mesh that stand for its surface. The arrays are views of the set's own memory.
     """
 
+    def __init__(self) -> None:
+        """No points."""
+
     @property
     def positions(self) -> NDArray[numpy.float32]:
         """(N, 3) float32, metres."""
@@ -681,6 +684,10 @@ class DomeLight:
 
     @property
     def has_image(self) -> bool: ...
+
+    @property
+    def image(self) -> object:
+        """(height, width, 3) float32, or None for a uniform dome."""
 
     def radiance(self, direction: Sequence[float]) -> list[float]:
         """

@@ -60,6 +60,16 @@ void bind_lights(nb::module_& module) {
             },
             "image"_a = nb::none(), "path"_a = "DomeLight")
         .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
+        .def_prop_ro(
+            "image",
+            [](nb::handle self) -> nb::object {
+                const DomeLight& light = nb::cast<const DomeLight&>(self);
+                if (!light.image) return nb::none();
+                const Environment& image = *light.image;
+                return nb::cast(view(&image.pixels().data()->x,
+                                     {std::size_t(image.height()), std::size_t(image.width()), 3}, self));
+            },
+            "(height, width, 3) float32, or None for a uniform dome.")
         .def(
             "radiance",
             [](const DomeLight& light, const Triple& direction) {

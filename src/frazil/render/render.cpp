@@ -230,6 +230,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
                 Tile tile(kTileSize * kTileSize, groups.size());
                 render_tile(scene, options, tracer, view_axis, filter, canvas, open[i], tile);
+                if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);
                 camera_rays += tile.camera_rays;
                 rays += tile.rays;
