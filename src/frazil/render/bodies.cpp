@@ -132,8 +132,10 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene, const RayScen
             const auto transmittance = [&](float cos_theta) {
                 return bodies[i]->transmittance(cos_theta, material->roughness.value);
             };
-            Irradiance irradiance = bake_irradiance(lit[i].points, ray_scene, lights, transmittance,
-                                                    {options.bake_samples, options.seed}, progress);
+            IrradianceOptions bake_options{options.bake_samples, options.seed};
+            bake_options.objects = {static_cast<std::uint32_t>(i)};
+            Irradiance irradiance =
+                bake_irradiance(lit[i].points, ray_scene, lights, transmittance, bake_options, progress);
             stats.bake_rays += irradiance.rays;
             stats.dropped_samples += irradiance.dropped_samples;
             lit[i].irradiance = std::move(irradiance.values);
