@@ -32,6 +32,8 @@ def render(
     *,
     resolution: tuple[int, int] = (960, 540),
     samples: int = 32,
+    noise: float = 0.0,
+    min_samples: int = 16,
     seed: int = 0,
     threads: int = 0,
     max_bounces: int = 4,
@@ -53,7 +55,12 @@ def render(
     resolution : (int, int)
         Width and height in pixels, each from 1 to 65536.
     samples : int
-        Camera paths per pixel, 1 or more.
+        Camera paths per pixel, 1 or more; the most, where `noise` is given.
+    noise : float
+        Standard error at which a pixel gets no more samples, relative to its luminance plus a tenth of the picture's
+        mean, averaged over 5x5 pixels; 0 gives every pixel all samples. The layer ``sample_count`` tells how many.
+    min_samples : int
+        Paths per pixel before `noise` is asked, 1 or more.
     seed : int
         Of all random numbers. The same seed gives the same bits, for any number of threads.
     threads : int
@@ -102,6 +109,8 @@ def render(
         "width": resolution[0],
         "height": resolution[1],
         "samples": samples,
+        "noise": noise,
+        "min_samples": min_samples,
         "seed": seed,
         "threads": threads,
         "max_bounces": max_bounces,
@@ -114,11 +123,19 @@ def render(
         "filter": pixel_filter,
     }
     _refuse_what_cannot_fit(*resolution)
-    result = _stoppable(lambda report: _frazil.render(scene, progress=report, **options), progress)
+    core = _core_options(options)
+    result = _stoppable(lambda report: _frazil.render(scene, core, progress=report), progress)
     stats = {**result.stats, "peak_memory": peak_memory()}
     for message in stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
     return Film(result.layers, _provenance(scene, options, stats), stats)
+
+
+def _core_options(options: dict[str, Any]) -> _frazil.RenderOptions:
+    core = _frazil.RenderOptions()
+    for name, value in options.items():
+        setattr(core, name, value)
+    return core
 
 
 def peak_memory() -> int:

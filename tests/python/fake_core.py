@@ -44,8 +44,11 @@ class Core:
         self.steps = steps
         self.on_step = on_step
 
-    def render(self, scene, *, progress, **options):
-        self.options = options
+    def render(self, scene, options, *, progress, **job):
+        names = [name for name in dir(options) if not name.startswith("_")]
+        self.options = {name: getattr(options, name) for name in names}
+        self.options["spacing"] = round(options.spacing, 6)  # a float32 in the core
+        self.job = job
         self.frames.append(scene.frame)
         for stage in ("points", "bake", "tree", "render"):
             for step in range(self.steps):
@@ -59,7 +62,7 @@ class Core:
             "warnings": [],
             "seconds": {"points": 0.1, "render": 0.2},
         }
-        return SimpleNamespace(layers=layers(options["width"], options["height"]), stats=stats)
+        return SimpleNamespace(layers=layers(options.width, options.height), stats=stats)
 
 
 def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"):

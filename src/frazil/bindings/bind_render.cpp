@@ -54,59 +54,166 @@ nb::dict stats_of(const RenderStats& stats) {
     return result;
 }
 
-// Render without the GIL; take it back for each progress report, where Ctrl-C is seen too.
-RenderResult render_from_python(const Scene& scene, int width, int height, int samples, std::uint32_t seed, int threads,
-                                const std::string& filter, int max_bounces, float spacing, float spacing_scale,
-                                int bake_samples, int bake_bounces, float tolerance, const std::string& estimator,
-                                nb::object progress) {
-    RenderOptions options;
-    options.width = width;
-    options.height = height;
-    options.samples = samples;
-    options.seed = seed;
-    options.threads = threads;
-    options.filter = filter_named(filter);
-    options.max_bounces = max_bounces;
-    options.spacing = spacing;
-    options.spacing_scale = spacing_scale;
-    options.bake_samples = bake_samples;
-    options.bake_bounces = bake_bounces;
-    options.gather = {tolerance, estimator_named(estimator)};
+// Tells Python how far the core is, and hears from it whether to stop.
+// A Python error (Ctrl-C among them) stops the job and is raised once the threads are home.
+class Reporter {
+  public:
+    explicit Reporter(nb::object report)
+        : report_(std::move(report)),
+          progress_([this](const char* stage, double fraction) { tell(stage, fraction); },
+                    [this] { return is_stopped(); }) {}
 
-    // A Python error (Ctrl-C among them) stops the render and is raised once the threads are home.
-    std::exception_ptr python_error;
-    Progress reporter(
-        [&](const char* stage, double fraction) {
-            if (progress.is_none() || python_error) return;
-            const nb::gil_scoped_acquire gil;
-            try {
-                progress(stage, fraction);
-            } catch (...) {
-                python_error = std::current_exception();
-            }
-        },
-        [&] {
-            if (python_error) return true;
-            const nb::gil_scoped_acquire gil;
-            try {
-                if (PyErr_CheckSignals() != 0) throw nb::python_error();
-            } catch (...) {
-                python_error = std::current_exception();
-            }
-            return python_error != nullptr;
-        });
-    try {
-        const nb::gil_scoped_release no_gil;
-        return render(scene, options, &reporter);
-    } catch (const Cancelled&) {
-        if (python_error) std::rethrow_exception(python_error);
-        throw;
+    // Run work(progress) without the GIL.
+    template <class Work>
+    auto run(const Work& work) {
+        try {
+            const nb::gil_scoped_release no_gil;
+            return work(&progress_);
+        } catch (const Cancelled&) {
+            if (python_error_) std::rethrow_exception(python_error_);
+            throw;
+        }
     }
+
+    // Call back into Python from any thread; an error there stops the job.
+    template <class Call>
+    void call(const Call& call) {
+        const nb::gil_scoped_acquire gil;
+        try {
+            call();
+        } catch (...) {
+            if (!python_error_) python_error_ = std::current_exception();
+        }
+    }
+
+  private:
+    void tell(const char* stage, double fraction) {
+        if (report_.is_none() || python_error_) return;
+        call([&] { report_(stage, fraction); });
+    }
+    bool is_stopped() {
+        if (python_error_) return true;
+        call([] {
+            if (PyErr_CheckSignals() != 0) throw nb::python_error();
+        });
+        return python_error_ != nullptr;
+    }
+
+    nb::object report_;
+    std::exception_ptr python_error_;
+    Progress progress_;
+};
+
+nb::dict state_of(const FilmState& state) {
+    nb::dict result;
+    for (const auto& [name, values] : state) {
+        // A copy: what is written must not change while the render goes on.
+        auto* copy = new std::vector<float>(values.begin(), values.end());
+        const nb::capsule owner(copy, [](void* memory) noexcept { delete static_cast<std::vector<float>*>(memory); });
+        result[name.c_str()] = view(copy->data(), {copy->size()}, owner);
+    }
+    return result;
+}
+
+RenderResult render_from_python(const Scene& scene, const RenderOptions& options, nb::object progress,
+                                const Bake* baked, nb::object checkpoint, double checkpoint_seconds,
+                                const std::optional<std::map<std::string, FloatArray>>& resume) {
+    Reporter reporter(std::move(progress));
+    FilmState saved;
+    if (resume) {
+        for (const auto& [name, array] : *resume) saved[name] = {const_cast<float*>(array.data()), array.size()};
+    }
+    Checkpoints checkpoints;
+    checkpoints.every_seconds = checkpoint_seconds;
+    if (!checkpoint.is_none()) {
+        checkpoints.save = [&](const FilmState& state) { reporter.call([&] { checkpoint(state_of(state)); }); };
+    }
+    if (resume) checkpoints.resume_from = &saved;
+    return reporter.run([&](Progress* report) { return render(scene, options, report, baked, &checkpoints); });
+}
+
+BakeResult bake_from_python(const Scene& scene, const RenderOptions& options, const Bake* known, nb::object progress) {
+    Reporter reporter(std::move(progress));
+    return reporter.run([&](Progress* report) { return bake(scene, options, known ? *known : Bake{}, report); });
+}
+
+void bind_options(nb::module_& module) {
+    nb::class_<RenderOptions>(module, "RenderOptions", "What a render is asked for; see frazil.render for each.")
+        .def(nb::init<>())
+        .def_rw("width", &RenderOptions::width)
+        .def_rw("height", &RenderOptions::height)
+        .def_rw("samples", &RenderOptions::samples)
+        .def_rw("noise", &RenderOptions::noise)
+        .def_rw("min_samples", &RenderOptions::min_samples)
+        .def_rw("seed", &RenderOptions::seed)
+        .def_rw("threads", &RenderOptions::threads)
+        .def_rw("max_bounces", &RenderOptions::max_bounces)
+        .def_rw("spacing", &RenderOptions::spacing)
+        .def_rw("spacing_scale", &RenderOptions::spacing_scale)
+        .def_rw("bake_samples", &RenderOptions::bake_samples)
+        .def_rw("bake_bounces", &RenderOptions::bake_bounces)
+        .def_prop_rw(
+            "tolerance", [](const RenderOptions& self) { return self.gather.tolerance; },
+            [](RenderOptions& self, float tolerance) { self.gather.tolerance = tolerance; })
+        .def_prop_rw(
+            "estimator",
+            [](const RenderOptions& self) { return self.gather.estimator == Estimator::sum ? "sum" : "noise_free"; },
+            [](RenderOptions& self, const std::string& name) { self.gather.estimator = estimator_named(name); })
+        .def_prop_rw(
+            "filter",
+            [](const RenderOptions& self) { return self.filter == PixelFilter::box ? "box" : "blackman_harris"; },
+            [](RenderOptions& self, const std::string& name) { self.filter = filter_named(name); });
+}
+
+void bind_bake(nb::module_& module) {
+    nb::class_<Bake>(module, "Bake",
+                     "Points and light of every translucent body of a scene: what serves all cameras and frames that\n"
+                     "show the same shapes under the same lights.")
+        .def(nb::init<>(), "A bake of nothing.")
+        .def_ro("groups", &Bake::groups, "The light groups.")
+        .def(
+            "__len__", [](const Bake& bake) { return bake.bodies.size(); }, "Objects of the scene.")
+        .def(
+            "points",
+            [](const Bake& bake, std::size_t index) -> const PointSet& {
+                if (index >= bake.bodies.size()) throw nb::index_error();
+                return bake.bodies[index].points;
+            },
+            "index"_a, nb::rv_policy::reference_internal, "The PointSet of an object; empty where it is not ice.")
+        .def(
+            "irradiance",
+            [](nb::handle self, std::size_t index) {
+                Bake& bake = nb::cast<Bake&>(self);
+                if (index >= bake.bodies.size()) throw nb::index_error();
+                LitPoints& lit = bake.bodies[index];
+                return view(&lit.irradiance.data()->x, {lit.points.size(), bake.groups.size(), 3}, self);
+            },
+            "index"_a, "(N, G, 3) float32: light that enters an object's points, per light group.")
+        .def(
+            "append",
+            [](Bake& bake, const PointSet& points, const FloatArray& irradiance) {
+                if (irradiance.ndim() != 3 || irradiance.shape(0) != points.size() ||
+                    irradiance.shape(1) != bake.groups.size() || irradiance.shape(2) != 3) {
+                    throw ValueError(
+                        str("Bake: irradiance must be of shape (", points.size(), ", ", bake.groups.size(), ", 3)."));
+                }
+                const auto* values = reinterpret_cast<const Rgb*>(irradiance.data());
+                bake.bodies.push_back({points, {values, values + points.size() * bake.groups.size()}});
+            },
+            "points"_a, "irradiance"_a, "Add the next object (copied).")
+        .def(
+            "__init__",
+            [](Bake* self, std::vector<std::string> groups) {
+                new (self) Bake{std::move(groups), {}};
+            },
+            "groups"_a, "A bake of these light groups, without objects yet.");
 }
 
 }  // namespace
 
 void bind_render(nb::module_& module) {
+    bind_options(module);
+    bind_bake(module);
     nb::class_<RenderResult>(module, "RenderResult", "What a render gives: layers and statistics.")
         .def_prop_ro(
             "layers", [](nb::handle self) { return layers_of(nb::cast<RenderResult&>(self), self); },
@@ -114,13 +221,22 @@ void bind_render(nb::module_& module) {
         .def_prop_ro(
             "stats", [](const RenderResult& self) { return stats_of(self.stats); },
             "dict: points, nodes, rays, gathers, dropped samples, seconds per stage.");
+    nb::class_<BakeResult>(module, "BakeResult", "What a bake gives: itself and statistics.")
+        .def_ro("bake", &BakeResult::bake)
+        .def_prop_ro(
+            "stats", [](const BakeResult& self) { return stats_of(self.stats); }, "As of a render.");
     module.def("aov_table", &aov_rows, "The AOV table: a list of dicts (name, channels, meaning, filter, ...).");
-    module.def("render", &render_from_python, "scene"_a, nb::kw_only(), "width"_a = 960, "height"_a = 540,
-               "samples"_a = 32, "seed"_a = 0, "threads"_a = 0, "filter"_a = "blackman_harris", "max_bounces"_a = 4,
-               "spacing"_a = 0.0f, "spacing_scale"_a = 1.0f, "bake_samples"_a = 64, "bake_bounces"_a = 1,
-               "tolerance"_a = 0.01f, "estimator"_a = "noise_free", "progress"_a = nb::none(),
+    module.def("render", &render_from_python, "scene"_a, "options"_a, nb::kw_only(), "progress"_a = nb::none(),
+               "bake"_a = nb::none(), "checkpoint"_a = nb::none(), "checkpoint_seconds"_a = 0.0,
+               "resume"_a = nb::none(),
                "Render a scene; see frazil.render. progress(stage, fraction) is called now and then from any thread;\n"
-               "an exception that it raises stops the render.");
+               "an exception that it raises stops the render. checkpoint(state) gets a dict of float32 arrays every\n"
+               "checkpoint_seconds (0: never) and when the render is stopped; `resume` takes such a dict.");
+    module.def(
+        "bake", &bake_from_python, "scene"_a, "options"_a, nb::kw_only(), "known"_a = nb::none(),
+        "progress"_a = nb::none(),
+        "Points and light of a scene's translucent bodies; what is `known` (points of objects that have some, light\n"
+        "of the groups that are named) is taken over.");
 }
 
 }  // namespace frazil

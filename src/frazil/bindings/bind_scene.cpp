@@ -90,7 +90,6 @@ void bind_camera(nb::module_& module) {
 }  // namespace
 
 void bind_scene(nb::module_& module) {
-    bind_lights(module);
     bind_camera(module);
 
     nb::class_<Material>(module, "Material", "A named model of the scene.")

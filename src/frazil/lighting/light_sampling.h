@@ -57,6 +57,8 @@ class LightSampler {
                     float t, LightHit& hit, LightUse use = LightUse::surface) const;
     // The mesh light that an object shows; -1 for none.
     int light_of_object(std::uint32_t object) const;
+    // Whether a mesh light stands for its object's material, which camera rays see itself.
+    bool is_material(int light) const { return std::get<MeshLight>(lights_[std::size_t(light)].shape).is_material; }
 
     // Dome radiance alone (the background of camera rays).
     Rgb background(const V3f& direction) const;

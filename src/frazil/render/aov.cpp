@@ -20,6 +20,10 @@ constexpr std::array kTable = {
     Aov{"P", "XYZ", "position, world space, metres", AovFilter::nearest, false, false},
     Aov{"object_id", "I", "1 + index of the object, 0 where nothing is hit; names are in the metadata",
         AovFilter::nearest, false, false},
+    Aov{"albedo", "RGB", "share of light that the first surface sends back, all lobes together", AovFilter::average,
+        false, true},
+    Aov{"sample_count", "Y", "samples that the pixel has got", AovFilter::average, false, false},
+    Aov{"variance", "Y", "squared standard error of the beauty's luminance", AovFilter::average, false, false},
     Aov{"coverage", "RGB", "W: the profile summed over the surface around the point; Rd_total on a plane",
         AovFilter::average, false, true},
 };

@@ -1,6 +1,5 @@
-// Translucent bodies: every object of ice with its points, the light that enters them and the tree that sums it.
-// Model: points -> irradiance -> bounces (bounces.h) -> tree, once per render. Objects that place the same mesh in the same
-//   size share one Poisson set, moved to each; light differs, so each has a tree of its own.
+// Translucent bodies: every object of ice with its boundary, its profile and the tree that sums the light of its points.
+// Model: one tree per object, of the points and light that were baked (bake.h).
 // Units: metres, world space.
 // Not: light that diffuses from one body into another that it touches.
 #pragma once
@@ -12,7 +11,8 @@
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/irradiance.h"
 #include "frazil/material/microfacet.h"
-#include "frazil/render/render.h"
+#include "frazil/render/options.h"
+#include "frazil/render/scene.h"
 #include "frazil/render/surface.h"
 #include "frazil/translucency/point_tree.h"
 
@@ -33,20 +33,17 @@ struct Body {
     Rgb radiance_per_exitance(const Surface& surface, const V3f& wo) const;
 };
 
-// A body's points and the light that enters them, needed until its tree is made.
+// A body's points and the light that enters them.
 struct LitPoints {
     PointSet points;
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
-// The spacing of an object's points: the render's, else the material's, else half the shortest mean free path of a
-// channel, but so that the object alone has about a thousand points at least and a million at most.
-float point_spacing(const IceMaterial& material, double area, const RenderOptions& options);
+// One entry per object of the scene, without trees; null for those that are not ice.
+std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
-// One entry per object of the scene; null for those that are not ice. Fills points, nodes, bake rays and seconds of the
-// stats. ValueError names the object whose points would not fit into memory.
-std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene, const RayScene& ray_scene,
-                                               const LightSampler& lights, const RenderOptions& options,
-                                               RenderStats& stats, Progress* progress);
+// Give every body the tree of its points, (N, groups) of light each. Fills points, nodes and seconds of the stats.
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, std::vector<std::unique_ptr<Body>>& bodies,
+                 RenderStats& stats);
 
 }  // namespace frazil

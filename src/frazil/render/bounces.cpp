@@ -63,7 +63,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
                  std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress) {
     if (options.bake_bounces == 0 || lights.is_empty()) return;
     Stopwatch watch(stats.seconds["bounces"]);
-    const std::size_t groups = light_groups(scene.lights).size();
+    const std::size_t groups = light_groups(lights.lights()).size();
     const SurfaceResolver resolver(scene);
     const BounceRadiance reflected = reflected_light(
         ray_scene, lights, [&](const BounceHit& hit) { return diffuse_albedo(resolver, hit); },

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "frazil/lighting/shadow.h"
 #include "frazil/material/microfacet.h"
 
 namespace frazil {
@@ -28,8 +29,10 @@ struct PathTracer::Path {
     // What light from the last vertex is worth to the camera, apart for paths whose first lobe was diffuse or specular.
     // Before the first vertex both are meaningless: `bounce` is 0.
     Rgb to_diffuse = Rgb(0.0f), to_specular = Rgb(0.0f);
-    // The last vertex: lobe values over pdf, and the pdf for MIS.
+    // The last vertex: lobe values over pdf, the pdf for MIS, and who receives light there (the camera: everything).
     Scattering last;
+    LightReceiver receiver;
+    bool has_passed = false;  // through something cut out, since the last vertex
 
     // Throughput to each of the two layers, with the last vertex's lobes weighted by a light's multipliers.
     std::pair<Rgb, Rgb> weights(float diffuse, float specular) const {
@@ -55,6 +58,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     Path path;
     path.pixel = pixel;
     path.ray = camera_ray;
+    path.receiver.position = camera_ray.origin;
     bool has_primary = false;
     int transparent_hits = 0;
 
@@ -62,7 +66,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         Hit hit;
         ++tile.rays;
         const bool is_hit = ray_scene_.intersect(path.ray, hit);
-        add_lights_on_ray(path, is_hit ? hit.t : std::numeric_limits<float>::infinity(), tile);
+        add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
@@ -83,18 +87,21 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
             path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
             path.ray.t_max -= hit.t;
             path.ray.t_min = 0.0f;
+            path.has_passed = true;
             continue;
         }
         if (!has_primary) {
             has_primary = true;
             const float depth = (surface.position - camera_ray.origin).dot(view_axis);
-            tile.add_primary(pixel, {depth, surface.position, surface.normal, surface.object + 1});
+            tile.add_primary(pixel, {depth, surface.position, surface.normal, shader.albedo(wo), surface.object + 1});
         }
 
-        // What the surface itself gives: emission, and light that diffused through ice.
-        if (const Rgb emission = shader.emission(); emission != Rgb(0.0f)) {
+        // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
+        const int own_light = lights_.light_of_object(surface.object);
+        const bool is_own = own_light < 0 || (path.bounce == 0 && lights_.is_material(own_light));
+        if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
             if (path.bounce == 0) {
-                tile.add(pixel, Component::emission, 0, emission);
+                tile.add(pixel, Component::emission, own_light < 0 ? 0 : group_of_light_[own_light], emission);
             } else {
                 const auto [diffuse, specular] = path.weights(1.0f, 1.0f);
                 tile.add(pixel, Component::diffuse, 0, diffuse * emission);
@@ -116,6 +123,8 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
         value.specular /= value.pdf;
         if (path.bounce > 0) std::tie(path.to_diffuse, path.to_specular) = path.weights(1.0f, 1.0f);
         path.last = value;
+        path.receiver = {surface.position, surface.geometric_normal, surface.object};
+        path.has_passed = false;
         ++path.bounce;
 
         // Russian roulette on what the path may still bring.
@@ -135,18 +144,32 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
 
 // Light that the ray runs into: domes for camera rays, every light with an extent after that, weighted against
 // add_direct_light's choice of the same direction.
-void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) const {
+void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const {
     thread_local std::vector<LightHit> hits;
     hits.clear();
-    lights_.intersect(path.ray.origin, path.ray.direction, t_max, hits);
-    for (const LightHit& hit : hits) {
+    const float t_max = surface ? surface->t : std::numeric_limits<float>::infinity();
+    lights_.intersect(path.receiver, path.ray.origin, path.ray.direction, t_max, hits);
+    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle,
+                                                     path.ray.direction, t_max, mesh)) {
+        hits.push_back(mesh);
+    }
+    for (LightHit& hit : hits) {
         const Light& light = lights_.lights()[hit.light];
         const std::size_t group = group_of_light_[hit.light];
         if (path.bounce == 0) {
+            if (t_max < hit.distance) continue;
             if (std::holds_alternative<DomeLight>(light.shape)) {
                 tile.add(path.pixel, Component::background, group, hit.radiance);
+            } else if (std::holds_alternative<MeshLight>(light.shape) && !lights_.is_material(hit.light)) {
+                tile.add(path.pixel, Component::emission, group, hit.radiance);
             }
             continue;
+        }
+        // Lights whose shadows are not plain may shine through what the ray has met: they are asked once, from the vertex.
+        if (!lights_.has_plain_shadow(hit.light) && !std::holds_alternative<MeshLight>(light.shape)) {
+            if (path.has_passed) continue;
+            const Ray shadow{path.ray.origin, path.ray.direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
+            hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
         }
         const float mis = path.last.pdf / (path.last.pdf + hit.pdf);
         const auto [diffuse, specular] =
@@ -160,7 +183,8 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[sample.light];
@@ -173,10 +197,11 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     ++tile.rays;
-    if (ray_scene_.is_occluded(shadow)) return;
+    const Rgb arriving = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow);
+    if (arriving == Rgb(0.0f)) return;
 
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
-    const Rgb light_over_pdf = sample.radiance * (mis / sample.pdf);
+    const Rgb light_over_pdf = arriving * (mis / sample.pdf);
     const std::size_t group = group_of_light_[sample.light];
     Rgb diffuse = diffuse_lobe, specular = specular_lobe;
     if (path.bounce > 0) {
@@ -199,6 +224,7 @@ void PathTracer::request_gather(const Path& path, const Surface& surface, const 
     GatherRequest request;
     request.object = surface.object;
     request.pixel = path.pixel;
+    request.subset = tile.subset;
     request.position = surface.position;
     request.is_primary = path.bounce == 0;
     if (request.is_primary) {
@@ -211,16 +237,16 @@ void PathTracer::request_gather(const Path& path, const Surface& surface, const 
 
     if (ice.compensation.mode == CompensationMode::fill) {
         const float u_pick = sampler.next_1d();
-        const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+        const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+        const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d(), LightUse::translucency);
         const float cosine = surface.normal.dot(sample.direction);
         Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
                    sample.distance * (1.0f - 1e-4f)};
-        if (sample.pdf > 0.0f && cosine > 0.0f && surface.geometric_normal.dot(sample.direction) > 0.0f &&
-            !ray_scene_.is_occluded(shadow)) {
+        if (sample.pdf > 0.0f && cosine > 0.0f && surface.geometric_normal.dot(sample.direction) > 0.0f) {
             const Light& light = lights_.lights()[sample.light];
             const float entering = body->transmittance(cosine, eval_float(ice.roughness, surface.st));
-            request.entering =
-                sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
+            request.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
+                               (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
             request.entering_group = static_cast<std::uint32_t>(group_of_light_[sample.light]);
         }
     }
@@ -243,6 +269,7 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
+            tile.subset = request.subset;
             const Rgb& coverage = gathered.coverage[i - begin];
             const Compensation& compensation = body.material->compensation;
             const Rgb gain = compensation_gain(compensation, coverage, body.total_reflectance);

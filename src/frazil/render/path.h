@@ -35,7 +35,7 @@ class PathTracer {
 
   private:
     struct Path;
-    void add_lights_on_ray(const Path& path, float t_max, Tile& tile) const;
+    void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
     void request_gather(const Path& path, const Surface& surface, const V3f& wo, Sampler& sampler, Tile& tile) const;

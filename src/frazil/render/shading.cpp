@@ -9,10 +9,22 @@ Shader::Shader(const Surface& surface, const Body* body)
     std::tie(tangent_, bitangent_) = tangent_frame(normal_);
     if (body_) {
         alpha_ = alpha_from_roughness(eval_float(body_->material->roughness, surface.st));
+        core_albedo_ =
+            body_->total_reflectance * eval_color(body_->material->tint, surface.st) * body_->material->translucency;
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
         standard_.emplace(material, surface.st, surface.display_color);
     }
+}
+
+Rgb Shader::albedo(const V3f& wo) const {
+    const V3f local_wo = to_local(wo);
+    if (standard_) {
+        const auto lobes = standard_->albedo(local_wo);
+        return lobes.diffuse + lobes.specular;
+    }
+    const float reflected = body_->material->specular * body_->boundary->eval(std::max(0.0f, local_wo.z), alpha_);
+    return Rgb(reflected) + core_albedo_ * (1.0f - reflected);
 }
 
 Scattering Shader::eval(const V3f& wo, const V3f& wi) const {

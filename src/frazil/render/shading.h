@@ -28,6 +28,9 @@ class Shader {
     float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
+    // The share of light from all around that goes towards wo, all lobes together.
+    Rgb albedo(const V3f& wo) const;
+
     Scattering eval(const V3f& wo, const V3f& wi) const;
     // False where the sample is lost.
     bool sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const;
@@ -39,7 +42,8 @@ class Shader {
     V3f geometric_normal_, normal_, tangent_, bitangent_;
     std::optional<StandardBsdf> standard_;
     const Body* body_ = nullptr;
-    float alpha_ = 0.0f;  // of the ice's boundary
+    float alpha_ = 0.0f;           // of the ice's boundary
+    Rgb core_albedo_ = Rgb(0.0f);  // of the ice under its boundary
 };
 
 }  // namespace frazil

@@ -4,6 +4,7 @@
 // Units: radiance.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -15,11 +16,16 @@ namespace frazil {
 // The additive rows of the AOV table, in its order.
 enum class Component { translucency, diffuse, specular, emission, background };
 inline constexpr std::size_t kComponentCount = 5;
+inline constexpr std::array<const char*, kComponentCount> kComponentNames = {"translucency", "diffuse", "specular",
+                                                                             "emission", "background"};
+// A pixel's samples are dealt in turn to so many subsets, whose spread tells the noise of all together.
+inline constexpr int kSampleSubsets = 4;
 
 // What the camera sees first along one sample.
 struct PrimaryHit {
     float depth = std::numeric_limits<float>::infinity();
     V3f position = V3f(0.0f), normal = V3f(0.0f);
+    Rgb albedo = Rgb(0.0f);
     std::uint32_t object_id = 0;
 };
 
@@ -27,6 +33,7 @@ struct PrimaryHit {
 struct GatherRequest {
     std::uint32_t object = 0;
     std::uint32_t pixel = 0;
+    int subset = 0;           // of the pixel's samples
     bool is_primary = false;  // then `weight` is to translucency, else the light goes the way of its first reflection
     V3f position = V3f(0.0f);
     Rgb weight = Rgb(0.0f), specular_weight = Rgb(0.0f);  // to translucency or diffuse; to specular
@@ -40,7 +47,9 @@ class Tile {
     Tile(std::size_t pixels, std::size_t groups)
         : groups_(groups),
           light_(pixels * kComponentCount * groups, Rgb(0.0f)),
+          luminance_(pixels * kSampleSubsets),
           normal_(pixels, V3f(0.0f)),
+          albedo_(pixels, Rgb(0.0f)),
           coverage_(pixels, Rgb(0.0f)),
           hits_(pixels),
           nearest_(pixels) {}
@@ -51,10 +60,12 @@ class Tile {
             return;
         }
         light_[(pixel * kComponentCount + static_cast<std::size_t>(component)) * groups_ + group] += radiance;
+        luminance_[pixel * kSampleSubsets + subset] += luminance(radiance);
     }
 
     void add_primary(std::size_t pixel, const PrimaryHit& hit) {
         normal_[pixel] += hit.normal;
+        albedo_[pixel] += hit.albedo;
         ++hits_[pixel];
         if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
     }
@@ -64,18 +75,25 @@ class Tile {
     const Rgb& light(std::size_t pixel, std::size_t component, std::size_t group) const {
         return light_[(pixel * kComponentCount + component) * groups_ + group];
     }
+    float subset_luminance(std::size_t pixel, int of_subset) const {
+        return luminance_[pixel * kSampleSubsets + of_subset];
+    }
+    const Rgb& albedo(std::size_t pixel) const { return albedo_[pixel]; }
     const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
     const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
     std::uint32_t hits(std::size_t pixel) const { return hits_[pixel]; }
     const PrimaryHit& nearest(std::size_t pixel) const { return nearest_[pixel]; }
 
     std::vector<GatherRequest> requests;
-    std::uint64_t rays = 0, dropped_samples = 0;
+    int subset = 0;  // of the sample that is traced or gathered now
+    std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
   private:
     std::size_t groups_;
     std::vector<Rgb> light_;
+    std::vector<float> luminance_;
     std::vector<V3f> normal_;
+    std::vector<Rgb> albedo_;
     std::vector<Rgb> coverage_;
     std::vector<std::uint32_t> hits_;
     std::vector<PrimaryHit> nearest_;

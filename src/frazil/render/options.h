@@ -1,0 +1,41 @@
+// What a render is asked for, and what it tells about itself.
+// Units: metres, seconds.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "frazil/render/pixel_filter.h"
+#include "frazil/translucency/point_tree.h"
+
+namespace frazil {
+
+struct RenderOptions {
+    int width = 960, height = 540;
+    int samples = 32;      // per pixel; the most, where `noise` may end earlier
+    float noise = 0.0f;    // standard error at which a pixel needs no more samples, relative (FilmSums); 0 = off
+    int min_samples = 16;  // per pixel, before `noise` is asked
+    std::uint32_t seed = 0;
+    int threads = 0;  // 0 = all cores
+    PixelFilter filter = PixelFilter::blackman_harris;
+    int max_bounces = 4;         // of diffuse and specular paths after the first hit
+    float spacing = 0.0f;        // of all points, metres; 0 = by material
+    float spacing_scale = 1.0f;  // multiplies every spacing
+    int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
+    int bake_bounces = 1;        // of light that reaches the points by way of ice and diffuse surfaces
+    GatherOptions gather;
+};
+
+struct RenderStats {
+    std::uint64_t points = 0, nodes = 0, camera_rays = 0, other_rays = 0, bake_rays = 0, gathers = 0;
+    std::uint64_t dropped_samples = 0;      // NaN or infinite, left out of the film
+    std::vector<std::string> warnings;      // each begins with an object's path
+    std::map<std::string, double> seconds;  // per stage: scene, points, bake, tree, render
+};
+
+// ValueError for options out of range.
+void check_options(const RenderOptions& options);
+
+}  // namespace frazil
