@@ -582,6 +582,9 @@ class ShadowRules:
     @property
     def casters(self) -> ObjectSet: ...
 
+    def with_casters(self, casters: ObjectSet | None) -> ShadowRules:
+        """The same rules with other casters."""
+
 class Light:
     """
     A light of the scene.
@@ -1081,6 +1084,14 @@ class Scene:
 
     def add_light(self, light: Light) -> int:
         """Add a light (copied); its index."""
+
+    def emissive_objects(self) -> list[int]:
+        """Indices of the objects whose material emits light."""
+
+    def triangle_emission(self, object: int) -> numpy.ndarray | None:
+        """
+        Mean radiance (F, 3) float32 that the material of an object emits, by triangle; None where it emits none.
+        """
 
     @property
     def camera(self) -> Camera: ...

@@ -162,7 +162,14 @@ void bind_lights(nb::module_& module) {
         .def_ro("distance", &ShadowRules::distance)
         .def_ro("falloff", &ShadowRules::falloff)
         .def_ro("falloff_gamma", &ShadowRules::falloff_gamma)
-        .def_prop_ro("casters", [](const ShadowRules& rules) { return rules.casters; });
+        .def_prop_ro("casters", [](const ShadowRules& rules) { return rules.casters; })
+        .def(
+            "with_casters",
+            [](ShadowRules rules, std::shared_ptr<const ObjectSet> casters) {
+                rules.casters = std::move(casters);
+                return rules;
+            },
+            "casters"_a.none(), "The same rules with other casters.");
 
     nb::class_<Light>(
         module, "Light",

@@ -3,6 +3,7 @@
 #include <nanobind/stl/variant.h>
 
 #include "frazil/bindings/bindings.h"
+#include "frazil/render/emission.h"
 #include "frazil/render/scene.h"
 
 namespace frazil {
@@ -144,6 +145,19 @@ void bind_scene(nb::module_& module) {
                 return int(scene.lights.size()) - 1;
             },
             "light"_a, "Add a light (copied); its index.")
+        .def("emissive_objects", &emissive_objects, "Indices of the objects whose material emits light.")
+        .def(
+            "triangle_emission",
+            [](const Scene& scene, int index) -> nb::object {
+                const std::uint32_t object = check_index(index, scene.objects.size(), "Scene", "object");
+                const std::vector<Rgb> values = triangle_emission(scene, object);
+                if (values.empty()) return nb::none();
+                auto* memory = new std::vector<Rgb>(values);
+                nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<Rgb>*>(p); });
+                return nb::cast(nb::ndarray<nb::numpy, float>(memory->data(), {memory->size(), 3}, owner));
+            },
+            "object"_a, nb::sig("def triangle_emission(self, object: int) -> numpy.ndarray | None"),
+            "Mean radiance (F, 3) float32 that the material of an object emits, by triangle; None where it emits none.")
         .def_rw("camera", &Scene::camera)
         .def_ro("meshes", &Scene::meshes, "Copies of the meshes, in the order of their indices.")
         .def(

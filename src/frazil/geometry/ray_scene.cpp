@@ -28,7 +28,13 @@ RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
 
 RTCScene make_scene() {
     RTCScene scene = rtcNewScene(embree_device());
+#if FRAZIL_EMBREE_MAJOR >= 4
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+#else
+    // Embree 3 must know that a query may bring a filter.
+    constexpr int kFlags = RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+    rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(kFlags));
+#endif
     return scene;
 }
 
