@@ -32,8 +32,7 @@ RTCScene make_scene() {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
 #else
     // Embree 3 must know that a query may bring a filter.
-    constexpr int kFlags = RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
-    rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(kFlags));
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
 #endif
     return scene;
 }
