@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "frazil/lighting/shadow.h"
 #include "frazil/material/microfacet.h"
 
 namespace frazil {
@@ -73,6 +74,10 @@ struct PathTracer::Path {
     // of the camera leaves.
     Scattering last;
     bool is_delta = false;  // lights could not be chosen at the last vertex
+    // Who receives light at the last vertex, and by which multipliers lights are chosen there (the camera: everything).
+    LightReceiver receiver;
+    LightUse use = LightUse::surface;
+    bool has_passed = false;  // through something cut out, since the last vertex
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
     bool has_direct_light = false;
@@ -120,8 +125,12 @@ struct PathTracer::Path {
         has_direct_light = false;
     }
 
-    void leave_from(const V3f& position, const V3f& side, const V3f& direction) {
-        ray.origin = offset_origin(position, side);
+    // `side` is the normal on the side that the path leaves for.
+    void leave_from(const Surface& surface, const V3f& side, const V3f& direction, LightUse light_use) {
+        receiver = {surface.position, side, surface.object};
+        use = light_use;
+        has_passed = false;
+        ray.origin = offset_origin(surface.position, side);
         ray.direction = direction;
         ray.t_min = 0.0f;
         ray.t_max = std::numeric_limits<float>::infinity();
@@ -132,6 +141,7 @@ struct PathTracer::Path {
         ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ray.t_max -= t;
         ray.t_min = 0.0f;
+        has_passed = true;
         ++straight;
     }
 
@@ -159,6 +169,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     path.ray = camera_ray;
     path.sampler = sampler;
     path.last.refraction = Rgb(1.0f);
+    path.receiver.position = camera_ray.origin;
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
@@ -183,7 +194,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         const float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
         path.begin_vertex();
         if (!path.inside.is_empty() && !cross_interior(path, length, path.sampler, tile)) return;
-        add_lights_on_ray(path, length, tile);
+        add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
@@ -227,9 +238,12 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         note_primary(shader.albedo(wo));
 
-        // What the surface itself gives: emission, and light that diffused through ice.
-        if (const Rgb emission = shader.emission(); emission != Rgb(0.0f)) {
-            deliver(path, Component::emission, path.weights(), 0, emission, tile);
+        // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
+        const int own_light = lights_.light_of_object(surface.object);
+        const bool is_own = own_light < 0 || (path.bounce == 0 && lights_.is_material(own_light));
+        if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
+            const std::size_t group = own_light < 0 ? 0 : group_of_light_[std::size_t(own_light)];
+            deliver(path, Component::emission, path.weights(), group, emission, tile);
         }
         float reflection_odds = 1.0f;
         if (body) {
@@ -283,7 +297,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
                 return;
             }
         }
-        path.leave_from(surface.position, surface.geometric_normal, wi);
+        path.leave_from(surface, surface.geometric_normal, wi, LightUse::surface);
         if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
             path.core = core_at(surface, filled);
             path.clear = 1.0f;
@@ -308,17 +322,34 @@ void PathTracer::deliver(const Path& path, Component primary, const Scattering& 
 
 // Light that the ray runs into: domes for camera rays, every light with an extent after that, weighted against
 // add_direct_light's choice of the same direction.
-void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) const {
+void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const {
     thread_local std::vector<LightHit> hits;
     hits.clear();
-    lights_.intersect(path.ray.origin, path.ray.direction, t_max, hits);
-    for (const LightHit& hit : hits) {
+    const V3f& direction = path.ray.direction;
+    const float t_max = surface ? surface->t : std::numeric_limits<float>::infinity();
+    lights_.intersect(path.receiver, path.ray.origin, direction, t_max, hits, path.use);
+    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle, direction,
+                                                     t_max, mesh, path.use)) {
+        hits.push_back(mesh);
+    }
+    for (LightHit& hit : hits) {
         const Light& light = lights_.lights()[std::size_t(hit.light)];
-        if (path.bounce == 0 && !std::holds_alternative<DomeLight>(light.shape)) continue;
         const std::size_t group = group_of_light_[std::size_t(hit.light)];
+        const bool is_mesh = std::holds_alternative<MeshLight>(light.shape);
         if (path.bounce == 0) {
-            deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
+            if (t_max < hit.distance) continue;
+            if (std::holds_alternative<DomeLight>(light.shape)) {
+                deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
+            } else if (is_mesh && !lights_.is_material(hit.light)) {
+                deliver(path, Component::emission, path.weights(), group, hit.radiance, tile);
+            }
             continue;
+        }
+        // Lights whose shadows are not plain may shine through what the ray has met: they are asked once, from the vertex.
+        if (!lights_.has_plain_shadow(hit.light) && !is_mesh) {
+            if (path.has_passed) continue;
+            const Ray shadow{path.ray.origin, direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
+            hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
         }
         const float mis = path.is_delta ? 1.0f : path.last.pdf / (path.last.pdf + hit.pdf);
         const Scattering weights =
@@ -328,11 +359,18 @@ void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) co
     }
 }
 
+Rgb PathTracer::arriving(const Ray& shadow, int light, InsideOf inside, Tile& tile, bool& is_straight) const {
+    if (lights_.has_plain_shadow(light)) return interiors_.visibility(shadow, inside, tile.rays, true, &is_straight);
+    ++tile.rays;
+    return shadow_factor(ray_scene_, lights_, light, shadow);
+}
+
 void PathTracer::add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
@@ -345,7 +383,7 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     bool is_straight = true;
-    const Rgb visible = interiors_.visibility(shadow, path.inside, tile.rays, true, &is_straight);
+    const Rgb visible = arriving(shadow, sample.light, path.inside, tile, is_straight);
     if (visible == Rgb(0.0f)) return;
     // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight) specular_lobe = Rgb(0.0f);
@@ -398,8 +436,8 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     path.core = core;
     path.clear = ice.refraction;
     path.volume = ice.volume;
-    path.leave_from(surface.position, -surface.geometric_normal,
-                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+    path.leave_from(surface, -surface.geometric_normal,
+                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f), LightUse::refraction);
     return true;
 }
 
@@ -460,15 +498,15 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         path.has_direct_light = false;
         path.light_share = Rgb(1.0f);
         path.is_delta = true;
-        path.leave_from(surface.position, surface.geometric_normal,
-                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
+        path.leave_from(surface, surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f), LightUse::refraction);
     } else {
         path.pass_boundary();
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)});
         path.is_delta = crossing.to != InsideOf::kNone;
         path.inside = crossing.beyond;
-        path.leave_from(surface.position, -surface.geometric_normal,
-                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+        path.leave_from(surface, -surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f), LightUse::refraction);
     }
     const int body = interiors_.filling(path.inside);
     if (body != InsideOf::kNone) {
@@ -486,7 +524,8 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     Path beyond = path;
     beyond.pass_boundary();
     if (lights_.is_empty() || beyond.light_share == Rgb(0.0f)) return;
-    const LightSample sample = lights_.sample(surface.position, u_pick, u);
+    const LightReceiver receiver{surface.position, -surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, u, LightUse::refraction);
     if (!(sample.pdf > 0.0f) || sample.direction.dot(surface.geometric_normal) >= 0.0f) return;
     const Frame frame(surface.normal);
     const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
@@ -497,7 +536,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
-    const Rgb visible = interiors_.visibility(shadow, crossing.beyond, tile.rays, true, &is_straight);
+    const Rgb visible = arriving(shadow, sample.light, crossing.beyond, tile, is_straight);
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
@@ -535,18 +574,16 @@ void PathTracer::add_entering_light(Core& core, const Surface& surface, const Bo
     const IceMaterial& ice = *body.material;
     if (ice.compensation.mode != CompensationMode::fill) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d(), LightUse::translucency);
     const float cosine = surface.normal.dot(sample.direction);
     const Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
-    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f ||
-        ray_scene_.is_occluded(shadow)) {
-        return;
-    }
+    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
     const Light& light = lights_.lights()[std::size_t(sample.light)];
     const float entering = body.transmittance(cosine, eval_float(ice.roughness, surface.st));
-    core.entering =
-        sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
+    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
+                    (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
     core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);
 }
 

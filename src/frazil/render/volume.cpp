@@ -81,11 +81,12 @@ V3f sample_henyey_greenstein(const V3f& direction, float g, const V2f& u) {
 }
 
 // One light in proportion to what it may give at the position, multipliers included.
-int SingleScattering::pick_light(const V3f& position, float u, float& probability) const {
+int SingleScattering::pick_light(const V3f& position, std::uint32_t object, float u, float& probability) const {
     const std::size_t count = lights_.lights().size();
     const auto weight = [&](std::size_t i) {
         const float scale = std::abs(volume_multiplier(lights_.lights()[i]));
-        return scale == 0.0f ? 0.0f : scale * lights_.world_light(int(i)).importance(position);
+        if (scale == 0.0f || !lights_.is_linked(int(i), object)) return 0.0f;
+        return scale * lights_.world_light(int(i)).importance(position);
     };
     float total = 0.0f;
     for (std::size_t i = 0; i < count; ++i) total += weight(i);
@@ -107,7 +108,8 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
     const float u_light = sampler.next_1d();
     const V2f u_place = sampler.next_2d(), u_direction = sampler.next_2d(), u_share = sampler.next_2d(),
               u_phase = sampler.next_2d();
-    const IceMaterial& ice = *bodies_[std::size_t(interiors_.filling(segment.inside))]->material;
+    const auto object = static_cast<std::uint32_t>(interiors_.filling(segment.inside));
+    const IceMaterial& ice = *bodies_[object]->material;
     const Rgb sigma_s = ice.medium.sigma_s_prime, sigma_t = sigma_s + ice.medium.sigma_a;
     if (!(max_component(sigma_s) > 0.0f)) return result;
     const auto cut = [&](const Rgb& sigma) {
@@ -116,7 +118,7 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
 
     // The light that is scattered once, from one light.
     float pick = 0.0f;
-    result.light = lights_.is_empty() ? -1 : pick_light(segment.origin, u_light, pick);
+    result.light = lights_.is_empty() ? -1 : pick_light(segment.origin, object, u_light, pick);
     if (result.light >= 0) {
         const Light& light = lights_.lights()[std::size_t(result.light)];
         const float length = cut(sigma_t);

@@ -47,7 +47,7 @@ class SingleScattering {
     OnceScattered sample(const Segment& segment, Sampler& sampler, std::uint64_t& rays) const;
 
   private:
-    int pick_light(const V3f& position, float u, float& probability) const;
+    int pick_light(const V3f& position, std::uint32_t object, float u, float& probability) const;
 
     const LightSampler& lights_;
     const Interiors& interiors_;
