@@ -878,6 +878,11 @@ class IceMaterial:
     medium : Medium, in 1/m.
     roughness : float in [0, 1], or a TextureLookup.
     specular, translucency : weights in [0, 1] of the reflection and of the core.
+    refraction : how much of what the medium leaves unscattered is seen through the boundary, in [0, 1].
+    refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.
+    volume : how much of the light scattered once inside is traced, in [0, 1].
+    anisotropy : g of that light, in [-0.95, 0.95].
+    priority : where bodies overlap, the highest fills the place.
     tint : RGB factor on what leaves the core, or a TextureLookup.
     ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.
     ramp_preserve_energy : keep the total reflectance whatever the ramp.
@@ -888,7 +893,7 @@ class IceMaterial:
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'ratio', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'ratio', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -919,6 +924,36 @@ class IceMaterial:
 
     @translucency.setter
     def translucency(self, arg: float, /) -> None: ...
+
+    @property
+    def refraction(self) -> float: ...
+
+    @refraction.setter
+    def refraction(self, arg: float, /) -> None: ...
+
+    @property
+    def refraction_roughness(self) -> float | None: ...
+
+    @refraction_roughness.setter
+    def refraction_roughness(self, value: float | None) -> None: ...
+
+    @property
+    def volume(self) -> float: ...
+
+    @volume.setter
+    def volume(self, arg: float, /) -> None: ...
+
+    @property
+    def anisotropy(self) -> float: ...
+
+    @anisotropy.setter
+    def anisotropy(self, arg: float, /) -> None: ...
+
+    @property
+    def priority(self) -> int: ...
+
+    @priority.setter
+    def priority(self, arg: int, /) -> None: ...
 
     @property
     def spacing(self) -> float: ...
