@@ -18,7 +18,7 @@ class MaterialInput:
     """
 
     name: str
-    kind: str  # float, color, bool, token, floats, colors
+    kind: str  # float, int, color, bool, token, floats, colors
     default: object
     minimum: float = 0.0
     maximum: float = INFINITY
@@ -71,6 +71,25 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("roughness", "float", 0.1, 0.0, 1.0, takes_texture=True, meaning="of the surface"),
     MaterialInput("specular", "float", 1.0, 0.0, 1.0, meaning="weight of the reflection"),
     MaterialInput("translucency", "float", 1.0, 0.0, 1.0, meaning="weight of the core"),
+    MaterialInput(
+        "refraction",
+        "float",
+        1.0,
+        0.0,
+        1.0,
+        meaning="how much of what the medium leaves unscattered is seen through the boundary",
+    ),
+    MaterialInput(
+        "refraction_roughness",
+        "float",
+        None,
+        0.0,
+        1.0,
+        meaning="of light that goes through the boundary; by default as `roughness`",
+    ),
+    MaterialInput("volume", "float", 0.0, 0.0, 1.0, meaning="how much of the light scattered once inside is traced"),
+    MaterialInput("anisotropy", "float", 0.0, -0.95, 0.95, meaning="g of the light scattered once"),
+    MaterialInput("priority", "int", 0, -1000, 1000, meaning="where bodies overlap, the highest fills the place"),
     MaterialInput("tint", "color", (1.0, 1.0, 1.0), takes_texture=True, meaning="multiplies what leaves the core"),
     MaterialInput(
         "ramp_distances", "floats", (), length_power=1, meaning="knots of the colour ramp, strictly increasing"

@@ -138,6 +138,11 @@ class MaterialReader:
                     "roughness",
                     "specular",
                     "translucency",
+                    "refraction",
+                    "refraction_roughness",
+                    "volume",
+                    "anisotropy",
+                    "priority",
                     "tint",
                     "ramp_preserve_energy",
                     "compensation",
@@ -254,7 +259,7 @@ class MaterialReader:
             array = np.repeat(array.reshape(1), 3)
         if row.kind == "float" and array.size == 3:
             array = array.reshape(3).mean()  # a colour where a number is wanted
-        width = {"float": 1, "color": 3, "floats": -1, "colors": 3}[row.kind]
+        width = {"float": 1, "int": 1, "color": 3, "floats": -1, "colors": 3}[row.kind]
         array = array.reshape(-1, 3) if row.kind == "colors" else array.reshape(width)
         array = array * self._context.meters_per_unit**row.length_power
         if not np.isfinite(array).all():
@@ -270,6 +275,8 @@ class MaterialReader:
             array = clamped
         if row.kind == "float":
             return float(array[0])
+        if row.kind == "int":
+            return round(float(array[0]))
         if row.kind == "colors":
             return [tuple(color) for color in array.tolist()]
         return tuple(array.tolist())

@@ -212,6 +212,11 @@ void bind_ice(nb::module_& module) {
         "medium : Medium, in 1/m.\n"
         "roughness : float in [0, 1], or a TextureLookup.\n"
         "specular, translucency : weights in [0, 1] of the reflection and of the core.\n"
+        "refraction : how much of what the medium leaves unscattered is seen through the boundary, in [0, 1].\n"
+        "refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.\n"
+        "volume : how much of the light scattered once inside is traced, in [0, 1].\n"
+        "anisotropy : g of that light, in [-0.95, 0.95].\n"
+        "priority : where bodies overlap, the highest fills the place.\n"
         "tint : RGB factor on what leaves the core, or a TextureLookup.\n"
         "ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.\n"
         "ramp_preserve_energy : keep the total reflectance whatever the ramp.\n"
@@ -222,23 +227,31 @@ void bind_ice(nb::module_& module) {
     cls.def(
         "__init__",
         [](IceMaterial* self, const Medium& medium, const FloatInput& roughness, float specular, float translucency,
-           const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
-           bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
-           float compensation_strength, float spacing) {
-            Ramp ramp{ramp_distances, {}, ramp_preserve_energy};
-            for (const Triple& color : ramp_colors) ramp.colors.push_back(to_v3f(color));
-            new (self) IceMaterial{medium,
-                                   to_input(roughness),
-                                   specular,
-                                   translucency,
-                                   to_input(tint),
-                                   std::move(ramp),
-                                   {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
-                                    compensation_limit, compensation_strength},
-                                   spacing};
+           float refraction, const std::optional<float>& refraction_roughness, float volume, float anisotropy,
+           int priority, const ColorInput& tint, const std::vector<float>& ramp_distances,
+           const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy, const std::string& compensation,
+           float compensation_limit, float compensation_strength, float spacing) {
+            IceMaterial model;
+            model.medium = medium;
+            model.roughness = to_input(roughness);
+            model.specular = specular;
+            model.translucency = translucency;
+            model.refraction = refraction;
+            model.refraction_roughness = refraction_roughness.value_or(model.refraction_roughness);
+            model.volume = volume;
+            model.anisotropy = anisotropy;
+            model.priority = priority;
+            model.tint = to_input(tint);
+            model.ramp = {ramp_distances, {}, ramp_preserve_energy};
+            for (const Triple& color : ramp_colors) model.ramp.colors.push_back(to_v3f(color));
+            model.compensation = {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
+                                  compensation_limit, compensation_strength};
+            model.spacing = spacing;
+            new (self) IceMaterial(std::move(model));
         },
         "medium"_a, nb::kw_only(), "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
-        "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
+        "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(), "volume"_a = 0.0f, "anisotropy"_a = 0.0f,
+        "priority"_a = 0, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
         "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "ratio",
         "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
     def_input(cls, "roughness", &IceMaterial::roughness);
@@ -246,6 +259,19 @@ void bind_ice(nb::module_& module) {
     cls.def_rw("medium", &IceMaterial::medium)
         .def_rw("specular", &IceMaterial::specular)
         .def_rw("translucency", &IceMaterial::translucency)
+        .def_rw("refraction", &IceMaterial::refraction)
+        .def_prop_rw(
+            "refraction_roughness",
+            [](const IceMaterial& model) {
+                return model.refraction_roughness < 0.0f ? std::nullopt : std::optional(model.refraction_roughness);
+            },
+            [](IceMaterial& model, const std::optional<float>& value) {
+                model.refraction_roughness = value.value_or(-1.0f);
+            },
+            "value"_a.none())
+        .def_rw("volume", &IceMaterial::volume)
+        .def_rw("anisotropy", &IceMaterial::anisotropy)
+        .def_rw("priority", &IceMaterial::priority)
         .def_rw("spacing", &IceMaterial::spacing)
         .def_prop_ro("ramp_distances", [](const IceMaterial& model) { return model.ramp.distances; })
         .def_prop_ro("ramp_colors",

@@ -60,6 +60,7 @@ struct SizeFactor {
     double operator()(const DiskLight& disk) const { return kPiD * disk.radius * disk.radius * cross_area(m); }
     double operator()(const SphereLight& sphere) const { return ellipsoid_area(sphere.radius, m); }
     double operator()(const CylinderLight& cylinder) const { return cylinder_area(cylinder, m); }
+    double operator()(const MeshLight& mesh) const { return surface_area(transformed(*mesh.mesh, m)); }
 };
 
 struct CheckShape {
@@ -79,7 +80,44 @@ struct CheckShape {
         check_size(light, "length", cylinder.length);
         check_size(light, "radius", cylinder.radius);
     }
+    void operator()(const MeshLight& mesh) const {
+        if (!mesh.mesh) throw ValueError(str(light.path, ": mesh must be given. Use the mesh that shines."));
+        check_mesh(*mesh.mesh, light.path);
+        if (!mesh.triangle_factors) return;
+        if (mesh.triangle_factors->size() != mesh.mesh->triangle_count()) {
+            throw ValueError(str(light.path, ": triangle_factors must be one per triangle (",
+                                 mesh.mesh->triangle_count(), "), got ", mesh.triangle_factors->size(), "."));
+        }
+        for (const Rgb& factor : *mesh.triangle_factors) {
+            if (is_finite(factor)) continue;
+            throw ValueError(str(light.path, ": triangle_factors must be finite, got (", factor.x, ", ", factor.y, ", ",
+                                 factor.z, ")."));
+        }
+    }
 };
+
+void require(const Light& light, bool holds, const char* rule, float value) {
+    if (!holds) throw ValueError(str(light.path, ": ", rule, ", got ", value, "."));
+}
+
+void check_shaping(const Light& light) {
+    const Shaping& s = light.shaping;
+    require(light, s.cone_angle >= 0.0f && s.cone_angle <= 180.0f, "shaping:cone:angle must be in [0, 180] degrees",
+            s.cone_angle);
+    require(light, s.cone_softness >= 0.0f && std::isfinite(s.cone_softness),
+            "shaping:cone:softness must be >= 0 and finite", s.cone_softness);
+    require(light, s.focus >= 0.0f && std::isfinite(s.focus), "shaping:focus must be >= 0 and finite", s.focus);
+    require(light, is_finite(s.focus_tint), "shaping:focusTint must be finite", s.focus_tint.x);
+}
+
+void check_shadow(const Light& light) {
+    const ShadowRules& s = light.shadow;
+    require(light, is_finite(s.color), "shadow:color must be finite", s.color.x);
+    require(light, !std::isnan(s.distance), "shadow:distance must be a number", s.distance);
+    require(light, !std::isnan(s.falloff), "shadow:falloff must be a number", s.falloff);
+    require(light, s.falloff_gamma > 0.0f && std::isfinite(s.falloff_gamma),
+            "shadow:falloffGamma must be > 0 and finite", s.falloff_gamma);
+}
 
 }  // namespace
 
@@ -100,6 +138,8 @@ void check_light(const Light& light) {
             }
         }
     }
+    check_shaping(light);
+    check_shadow(light);
     std::visit(CheckShape{light}, light.shape);
     const M44f& m = light.light_to_world;
     const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);

@@ -1,7 +1,9 @@
-// frazil:ice: a translucent core under a glossy dielectric boundary.
-// Model: translucency M/pi * T(wo)/T_avg + GGX reflection [Xie2014]; energy of the two sums to <= 1 (furnace).
+// frazil:ice: a clear to translucent core under a glossy dielectric boundary.
+// Model: GGX reflection and refraction over a core that light crosses unscattered (refraction), scattered once (volume)
+//   or many times (translucency, M/pi * T(wo)/T_avg) [Xie2014]. Along a refracted ray the unscattered part u =
+//   exp(-sigma_s_prime d) goes to what lies behind, the rest to the core, so that all sums to <= 1 (furnace).
 // Units: see Medium; roughness is the user's (alpha = roughness²).
-// Valid: roughness in [0,1], eta in [1,4].
+// Valid: roughness in [0,1], eta in [1,4], weights in [0,1], anisotropy in [-0.95, 0.95].
 #pragma once
 
 #include "frazil/material/texture.h"
@@ -16,6 +18,11 @@ struct IceMaterial {
     MaterialInput<float> roughness{0.1f, {}};
     float specular = 1.0f;                   // weight of the reflection, 0..1
     float translucency = 1.0f;               // weight of the core, 0..1
+    float refraction = 1.0f;                 // how much of what the medium leaves unscattered is seen, 0..1
+    float refraction_roughness = -1.0f;      // of light that goes through the boundary, 0..1; below 0 = as roughness
+    float volume = 0.0f;                     // how much of the light scattered once is traced, 0..1
+    float anisotropy = 0.0f;                 // g of the once-scattered light (Henyey-Greenstein)
+    int priority = 0;                        // where bodies overlap, the highest fills the place
     MaterialInput<Rgb> tint{Rgb(1.0f), {}};  // multiplies what leaves the core
     Ramp ramp;
     Compensation compensation;

@@ -11,20 +11,6 @@ constexpr float kMinAlpha = 1e-4f;
 // Below this cosine a direction counts as grazing: the table and the formulas stop there.
 constexpr float kMinCosine = 1e-4f;
 
-float ggx_distribution(const V3f& h, float alpha) {
-    const float a2 = alpha * alpha;
-    const float s = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
-    return 1.0f / (kPi * a2 * s * s);
-}
-
-// Smith's Lambda: the ratio of masked to visible area.
-float smith_lambda(const V3f& w, float alpha) {
-    const float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
-    // sqrt(1 + x) - 1 without the cancellation for small x.
-    const float x = alpha * alpha * tan2;
-    return 0.5f * x / (std::sqrt(1.0f + x) + 1.0f);
-}
-
 // Integrate fresnel(cos(wo, h)) * GGX over wi by stratified visible normals: the mean of F G2/G1.
 template <class Fresnel>
 float single_scattering_albedo(float cos_theta, float alpha, const Fresnel& fresnel) {
@@ -62,13 +48,26 @@ float schlick_weight(float cos_theta) {
     return m2 * m2 * m;
 }
 
+float ggx_distribution(const V3f& h, float alpha) {
+    const float a2 = alpha * alpha;
+    const float s = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
+    return 1.0f / (kPi * a2 * s * s);
+}
+
+float smith_lambda(const V3f& w, float alpha) {
+    const float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+    // sqrt(1 + x) - 1 without the cancellation for small x.
+    const float x = alpha * alpha * tan2;
+    return 0.5f * x / (std::sqrt(1.0f + x) + 1.0f);
+}
+
 float ggx_eval(const V3f& wo, const V3f& wi, float alpha) {
     if (wo.z <= 0.0f || wi.z <= 0.0f) return 0.0f;
     const V3f h = (wo + wi).normalized();
     return ggx_distribution(h, alpha) / (4.0f * wo.z * (1.0f + smith_lambda(wo, alpha) + smith_lambda(wi, alpha)));
 }
 
-V3f ggx_sample(const V3f& wo, float alpha, const V2f& u) {
+V3f ggx_sample_normal(const V3f& wo, float alpha, const V2f& u) {
     // Stretch to the hemisphere configuration, where visible normals are those of a spherical cap [Dupuy2023].
     const V3f stretched = V3f(alpha * wo.x, alpha * wo.y, wo.z).normalized();
     const float phi = 2.0f * kPi * u.x;
@@ -76,7 +75,17 @@ V3f ggx_sample(const V3f& wo, float alpha, const V2f& u) {
     const float sine = std::sqrt(std::clamp(1.0f - z * z, 0.0f, 1.0f));
     const V3f cap(sine * std::cos(phi), sine * std::sin(phi), z);
     const V3f unscaled = cap + stretched;
-    const V3f h = V3f(alpha * unscaled.x, alpha * unscaled.y, unscaled.z).normalized();
+    return V3f(alpha * unscaled.x, alpha * unscaled.y, unscaled.z).normalized();
+}
+
+float ggx_normal_pdf(const V3f& wo, const V3f& h, float alpha) {
+    const float cosine = wo.dot(h);
+    if (wo.z <= 0.0f || h.z <= 0.0f || cosine <= 0.0f) return 0.0f;
+    return ggx_distribution(h, alpha) * cosine / (wo.z * (1.0f + smith_lambda(wo, alpha)));
+}
+
+V3f ggx_sample(const V3f& wo, float alpha, const V2f& u) {
+    const V3f h = ggx_sample_normal(wo, alpha, u);
     return h * (2.0f * wo.dot(h)) - wo;
 }
 
@@ -95,8 +104,8 @@ float AlbedoTable::alpha_at(int j) {
     return alpha_from_roughness(float(j) / float(kAlphas - 1));
 }
 
-template <class Value>
-AlbedoTable::AlbedoTable(const Value& value) : directional_(kAlphas * kCosines), average_(kAlphas) {
+AlbedoTable::AlbedoTable(const std::function<float(float, float)>& value)
+    : directional_(kAlphas * kCosines), average_(kAlphas) {
     parallel_for(kAlphas, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t j = begin; j < end; ++j) {
             float* row = &directional_[j * kCosines];

@@ -1,11 +1,13 @@
 // GGX microfacet reflection at a dielectric or metallic boundary, with energy compensation, and its albedo tables.
 // Model: height-correlated Smith GGX, visible-normal sampling by spherical caps [Dupuy2023]; the light that further
-//   bounces between microfacets would carry is a second lobe [KullaConty2017], so that no energy is lost.
+//   bounces between microfacets would carry is a second lobe [KullaConty2017], so that no energy is lost. Refraction is in
+//   transmission.h.
 // Units: alpha = roughness² (alpha_from_roughness is the one place that maps it).
 // Valid: alpha in [1e-4, 1]; wo, wi in the local frame (z = normal), both pointing away.
-// Not: anisotropy, transmission.
+// Not: anisotropy.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -22,6 +24,13 @@ float fresnel_f0(float eta);
 // (1 - cos)^5: how far Schlick's approximation goes from F0 to 1.
 float schlick_weight(float cos_theta);
 
+// Density of the microfacet normal h, and Smith's Lambda: the ratio of masked to visible area.
+float ggx_distribution(const V3f& h, float alpha);
+float smith_lambda(const V3f& w, float alpha);
+// A microfacet normal visible from wo (wo.z > 0), and its density D G1 (wo.h) / wo.z per steradian of normals.
+V3f ggx_sample_normal(const V3f& wo, float alpha, const V2f& u);
+float ggx_normal_pdf(const V3f& wo, const V3f& h, float alpha);
+
 // f_r(wo, wi) * cos(wi), without the Fresnel factor, single scattering; 0 below the horizon.
 float ggx_eval(const V3f& wo, const V3f& wi, float alpha);
 // A direction wi reflected about a visible microfacet normal; z <= 0 means the sample is lost.
@@ -33,8 +42,7 @@ float ggx_pdf(const V3f& wo, const V3f& wi, float alpha);
 class AlbedoTable {
   public:
     // Fill with value(cos, alpha), evaluated in parallel.
-    template <class Value>
-    explicit AlbedoTable(const Value& value);
+    explicit AlbedoTable(const std::function<float(float, float)>& value);
     float eval(float cos_theta, float alpha) const;
     // 2 ∫ eval(cos, alpha) cos dcos: exact for the interpolated table.
     float average(float alpha) const;

@@ -12,6 +12,8 @@ constexpr std::array kTable = {
     Aov{"translucency", "RGB", "light that has diffused through ice", AovFilter::average, true, true},
     Aov{"diffuse", "RGB", "diffuse reflection, with what it lights further", AovFilter::average, true, true},
     Aov{"specular", "RGB", "glossy reflection, with what is seen in it", AovFilter::average, true, true},
+    Aov{"refraction", "RGB", "what is seen through the boundary of ice, unscattered", AovFilter::average, true, true},
+    Aov{"volume", "RGB", "light scattered once inside ice", AovFilter::average, true, true},
     Aov{"emission", "RGB", "light that surfaces emit", AovFilter::average, true, true},
     Aov{"background", "RGB", "dome lights seen directly", AovFilter::average, true, true},
     Aov{"Z", "Z", "distance along the viewing axis, metres; infinity where nothing is hit", AovFilter::nearest, false,

@@ -14,10 +14,14 @@ float Body::transmittance_average(float roughness) const {
     return 1.0f - material->specular * boundary->average(alpha_from_roughness(roughness));
 }
 
+Rgb Body::inner_radiance_per_exitance(const Surface& surface) const {
+    const float average = transmittance_average(eval_float(material->roughness, surface.st));
+    return eval_color(material->tint, surface.st) * (material->translucency * kInvPi / average);
+}
+
 Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
     const float roughness = eval_float(material->roughness, surface.st);
-    const float leaving = transmittance(surface.normal.dot(wo), roughness) / transmittance_average(roughness);
-    return eval_color(material->tint, surface.st) * (material->translucency * kInvPi * leaving);
+    return inner_radiance_per_exitance(surface) * transmittance(surface.normal.dot(wo), roughness);
 }
 
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {

@@ -29,6 +29,8 @@ struct Body {
     float transmittance(float cos_theta, float roughness) const;
     float transmittance_average(float roughness) const;
 
+    // Radiance over squared index, inside below the surface, per unit of exitance: what leaves before the boundary dims it.
+    Rgb inner_radiance_per_exitance(const Surface& surface) const;
     // Radiance towards wo per unit of exitance: diffuse inside, then through the boundary, so that T/T_avg averages to one.
     Rgb radiance_per_exitance(const Surface& surface, const V3f& wo) const;
 };

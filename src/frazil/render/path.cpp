@@ -3,40 +3,152 @@
 #include <algorithm>
 #include <tuple>
 
+#include "frazil/lighting/shadow.h"
 #include "frazil/material/microfacet.h"
 
 namespace frazil {
 namespace {
 
-// Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike.
-constexpr std::uint32_t kDimensionsPerVertex = 8;
+// Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike; a path that was split
+// off has vertices of its own.
+constexpr std::uint32_t kDimensionsPerVertex = 16;
+constexpr std::uint32_t kSplitVertex = 64;
 constexpr std::uint32_t kTransparencyDimensions = 4096;
 constexpr int kBouncesBeforeRoulette = 3;
 constexpr int kMaxTransparentHits = 64;
+// Meetings with the boundary from inside, after which the core answers for what is left; of these, how many pieces of the
+// path have their single scattering traced.
+constexpr int kMaxInnerBounces = 8, kMaxVolumePieces = 2;
+// A refracted path that is worth less than this goes on by chance only.
+constexpr float kFaint = 0.02f;
 
 float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
 }
 
+// A point's frame of shading.
+struct Frame {
+    explicit Frame(const V3f& n) : normal(n) { std::tie(tangent, bitangent) = tangent_frame(n); }
+    V3f to_local(const V3f& v) const { return {v.dot(tangent), v.dot(bitangent), v.dot(normal)}; }
+    V3f to_world(const V3f& v) const { return tangent * v.x + bitangent * v.y + normal * v.z; }
+    V3f normal, tangent, bitangent;
+};
+
+// The direction on the side of the plane that `sign` tells; one on the wrong side is mirrored at the plane.
+V3f on_side(const V3f& direction, const V3f& normal, float sign) {
+    const float cosine = direction.dot(normal) * sign;
+    return cosine > 0.0f ? direction : (direction - normal * (2.0f * sign * (cosine - 1e-5f))).normalized();
+}
+
+float refraction_alpha(const IceMaterial& ice, const V2f& st) {
+    return alpha_from_roughness(ice.refraction_roughness >= 0.0f ? ice.refraction_roughness
+                                                                 : eval_float(ice.roughness, st));
+}
+
 }  // namespace
+
+// Where a piece of a path inside ice begins, and what its core sends from there.
+struct PathTracer::Core {
+    int body = InsideOf::kNone;
+    V3f position = V3f(0.0f);
+    Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
+    bool is_primary = false;                // seen by the camera itself
+    // Light that enters right here, for the compensation that fills up; its light group.
+    Rgb entering = Rgb(0.0f);
+    std::uint32_t entering_group = 0;
+};
 
 // The state of a path between two vertices.
 struct PathTracer::Path {
-    std::uint32_t pixel = 0;
-    int bounce = 0;  // vertices that scattered so far
+    std::uint32_t pixel = 0, vertex = 0;
     Ray ray;
-    // What light from the last vertex is worth to the camera, apart for paths whose first lobe was diffuse or specular.
-    // Before the first vertex both are meaningless: `bounce` is 0.
-    Rgb to_diffuse = Rgb(0.0f), to_specular = Rgb(0.0f);
-    // The last vertex: lobe values over pdf, and the pdf for MIS.
+    Sampler sampler{0, 0, 0};
+    int bounce = 0;     // lobes that it was scattered by so far
+    int scattered = 0;  // of these, at surfaces other than boundaries met by refraction
+    int inner = 0;      // meetings with boundaries from inside
+    int straight = 0;   // surfaces that it went through without a lobe
+    // What light from before the last vertex is worth to the camera, by the layer of the first lobe; meaningless before the
+    // second vertex.
+    Scattering before;
+    // The last vertex: lobe values over pdf, and the pdf for MIS. Before the first vertex `refraction` is what ice in front
+    // of the camera leaves.
     Scattering last;
+    bool is_delta = false;  // lights could not be chosen at the last vertex
+    // Who receives light at the last vertex (the camera: everything), and which multipliers weigh in the choice there.
+    LightReceiver receiver;
+    LightUse use = LightUse::surface;
+    bool has_passed = false;  // through a surface without a lobe, since then
+    // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
+    // that they have not served.
+    bool has_direct_light = false;
+    Rgb light_share = Rgb(1.0f);
 
-    // Throughput to each of the two layers, with the last vertex's lobes weighted by a light's multipliers.
-    std::pair<Rgb, Rgb> weights(float diffuse, float specular) const {
-        if (bounce == 1) return {last.diffuse * diffuse, last.specular * specular};
-        const Rgb lobes = last.diffuse * diffuse + last.specular * specular;
-        return {to_diffuse * lobes, to_specular * lobes};
+    InsideOf inside;
+    Core core;
+    float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+
+    // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
+    Scattering weights(float diffuse, float specular, float refraction) const {
+        if (bounce <= 1) return {last.diffuse * diffuse, last.specular * specular, last.refraction * refraction, 0.0f};
+        const Rgb lobes = last.diffuse * diffuse + last.specular * specular + last.refraction * refraction;
+        return {before.diffuse * lobes, before.specular * lobes, before.refraction * lobes, 0.0f};
     }
+    Scattering weights() const { return weights(1.0f, 1.0f, 1.0f); }
+
+    void scatter(const Scattering& value_over_pdf) {
+        if (bounce > 0) {
+            before = weights();
+            last = value_over_pdf;
+        } else {
+            const Rgb attenuation = last.refraction;
+            last = value_over_pdf;
+            last.scale(attenuation);
+        }
+        ++bounce;
+    }
+
+    // Go on with the given chance; false where the path ends.
+    bool survives(float chance) {
+        if (chance >= 1.0f) return true;
+        if (!(sampler.next_1d() < chance)) return false;
+        last.scale(Rgb(1.0f / chance));
+        return true;
+    }
+
+    // What it left behind when it went through a boundary: lights already served from the last opaque vertex.
+    void pass_boundary() {
+        if (!has_direct_light) return;
+        for (int c = 0; c < 3; ++c) {
+            const float all = last.diffuse[c] + last.specular[c] + last.refraction[c];
+            light_share[c] *= all > 0.0f ? 1.0f - last.diffuse[c] / all : 0.0f;
+        }
+        has_direct_light = false;
+    }
+
+    // `side` is that of the surface which receives.
+    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
+        receiver = {surface.position, side, surface.object};
+        use = wanted;
+        has_passed = false;
+    }
+
+    void leave_from(const V3f& position, const V3f& side, const V3f& direction) {
+        ray.origin = offset_origin(position, side);
+        ray.direction = direction;
+        ray.t_min = 0.0f;
+        ray.t_max = std::numeric_limits<float>::infinity();
+    }
+
+    // Straight on through a surface.
+    void pass_through(const Surface& surface, float t) {
+        ray.origin = offset_origin(surface.position, -surface.geometric_normal);
+        ray.t_max -= t;
+        ray.t_min = 0.0f;
+        has_passed = true;
+        ++straight;
+    }
+
+    void begin_vertex() { sampler.set_dimension(kDimensionsPerVertex * ++vertex); }
 };
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
@@ -48,6 +160,9 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       bodies_(bodies),
       group_of_light_(group_of_light),
       resolver_(scene),
+      interiors_(scene, ray_scene, resolver_, bodies),
+      single_scattering_(lights, interiors_, bodies),
+      camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
       max_bounces_(max_bounces) {}
 
 void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
@@ -55,104 +170,195 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     Path path;
     path.pixel = pixel;
     path.ray = camera_ray;
-    bool has_primary = false;
-    int transparent_hits = 0;
+    path.receiver.position = camera_ray.origin;
+    path.sampler = sampler;
+    path.last.refraction = Rgb(1.0f);
+    path.inside = camera_inside_;
+    if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
+        Surface camera;
+        camera.position = camera_ray.origin;
+        path.core = core_at(camera, body);
+        path.core.is_primary = true;
+        path.volume = bodies_[std::size_t(body)]->material->volume;
+    }
+    Path refracted;
+    bool has_split = false;
+    follow(path, &view_axis, &refracted, has_split, tile);
+    bool has_none = false;
+    if (has_split) follow(refracted, nullptr, nullptr, has_none, tile);
+}
 
+void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const {
+    const V3f eye = path.ray.origin;
     while (true) {
         Hit hit;
         ++tile.rays;
         const bool is_hit = ray_scene_.intersect(path.ray, hit);
-        add_lights_on_ray(path, is_hit ? hit.t : std::numeric_limits<float>::infinity(), tile);
+        const float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
+        path.begin_vertex();
+        if (!path.inside.is_empty() && !cross_interior(path, length, path.sampler, tile)) return;
+        add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
         const Surface surface = resolver_.resolve(hit, path.ray.direction);
-        const Shader shader(surface, bodies_[surface.object].get());
-        sampler.set_dimension(kDimensionsPerVertex * static_cast<std::uint32_t>(path.bounce + 1));
+        const auto note_primary = [&](const Rgb& albedo) {
+            if (!view_axis) return;
+            const float depth = (surface.position - eye).dot(*view_axis);
+            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1});
+            view_axis = nullptr;
+        };
+        const Body* body = bodies_[surface.object].get();
 
-        // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
-        bool passes_through = false;
-        const float opacity = shader.opacity();
-        if (opacity < 1.0f) {
-            Sampler coin = sampler;
-            coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(transparent_hits));
-            if (++transparent_hits > kMaxTransparentHits) return;
-            passes_through = coin.next_1d() >= opacity;
-        }
-        if (passes_through) {
-            path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
-            path.ray.t_max -= hit.t;
-            path.ray.t_min = 0.0f;
-            continue;
-        }
-        if (!has_primary) {
-            has_primary = true;
-            const float depth = (surface.position - camera_ray.origin).dot(view_axis);
-            tile.add_primary(pixel, {depth, surface.position, surface.normal, shader.albedo(wo), surface.object + 1});
-        }
-
-        // What the surface itself gives: emission, and light that diffused through ice.
-        if (const Rgb emission = shader.emission(); emission != Rgb(0.0f)) {
-            if (path.bounce == 0) {
-                tile.add(pixel, Component::emission, 0, emission);
-            } else {
-                const auto [diffuse, specular] = path.weights(1.0f, 1.0f);
-                tile.add(pixel, Component::diffuse, 0, diffuse * emission);
-                tile.add(pixel, Component::specular, 0, specular * emission);
+        // Ice that rays may enter: go through where it is no boundary, meet its boundary from inside.
+        Crossing crossing;
+        const bool is_open = interiors_.is_open_to_rays(surface.object);
+        if (is_open) {
+            crossing = interiors_.cross(hit, path.ray.direction, path.inside);
+            if (path.straight > kMaxTransparentHits) return;
+            if (crossing.from != InsideOf::kNone) {
+                if (crossing.is_boundary()) {
+                    note_primary(Rgb(1.0f));
+                    if (!meet_boundary(path, surface, crossing, path.sampler, tile)) return;
+                } else {
+                    path.inside = crossing.beyond;
+                    path.pass_through(surface, hit.t);
+                }
+                continue;
             }
         }
-        request_gather(path, surface, wo, sampler, tile);
 
-        add_direct_light(path, surface, shader, wo, sampler, tile);
-        if (path.bounce >= max_bounces_) return;
+        // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
+        const Shader shader(surface, body);
+        if (const float opacity = shader.opacity(); opacity < 1.0f) {
+            Sampler coin = path.sampler;
+            coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(path.straight));
+            if (path.straight >= kMaxTransparentHits) return;
+            if (coin.next_1d() >= opacity) {
+                path.pass_through(surface, hit.t);
+                continue;
+            }
+        }
+        note_primary(shader.albedo(wo));
+
+        // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
+        const int own_light = lights_.light_of_object(surface.object);
+        const bool is_own = own_light < 0 || (path.bounce == 0 && lights_.is_material(own_light));
+        if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
+            const std::size_t group = own_light < 0 ? 0 : group_of_light_[std::size_t(own_light)];
+            deliver(path, Component::emission, path.weights(), group, emission, tile);
+        }
+        float reflection_odds = 1.0f;
+        if (body) {
+            const float leaving =
+                body->transmittance(surface.normal.dot(wo), eval_float(body->material->roughness, surface.st));
+            Core core = core_at(surface, static_cast<int>(surface.object));
+            core.is_primary = path.bounce == 0;
+            add_entering_light(core, surface, *body, path.sampler);
+            if (!is_open || crossing.to == InsideOf::kNone) {
+                request_gather(path, core, Rgb(leaving), tile);
+            } else if (split) {
+                *split = path;
+                split->vertex += kSplitVertex;
+                split->begin_vertex();
+                has_split = enter(*split, surface, crossing, 1.0f / leaving, core, split->sampler);
+                split = nullptr;
+            } else {
+                // Either reflect or enter, by how much goes either way.
+                reflection_odds = std::clamp(1.0f - leaving, 0.05f, 0.95f);
+                if (path.sampler.next_1d() >= reflection_odds) {
+                    // The light that comes straight from lights is the reflection's, whichever way the path goes.
+                    add_direct_light(path, surface, shader, wo, path.sampler, tile);
+                    if (!enter(path, surface, crossing, (1.0f - reflection_odds) / leaving, core, path.sampler)) return;
+                    continue;
+                }
+            }
+        }
+
+        add_direct_light(path, surface, shader, wo, path.sampler, tile);
+        if (path.scattered >= max_bounces_) return;
 
         // Continue along one lobe.
         V3f wi;
-        const float u_lobe = sampler.next_1d();
-        if (!shader.sample(wo, u_lobe, sampler.next_2d(), wi)) return;
+        const float u_lobe = path.sampler.next_1d();
+        if (!shader.sample(wo, u_lobe, path.sampler.next_2d(), wi)) return;
         Scattering value = shader.eval(wo, wi);
         if (!(value.pdf > 0.0f)) return;
-        value.diffuse /= value.pdf;
-        value.specular /= value.pdf;
-        if (path.bounce > 0) std::tie(path.to_diffuse, path.to_specular) = path.weights(1.0f, 1.0f);
-        path.last = value;
-        ++path.bounce;
+        value.scale(Rgb(1.0f / (value.pdf * reflection_odds)));
+        path.scatter(value);
+        path.receive(surface, surface.geometric_normal, LightUse::surface);
+        ++path.scattered;
+        path.is_delta = false;
+        path.has_direct_light = true;
+        path.light_share = Rgb(1.0f);
+        split = nullptr;
 
         // Russian roulette on what the path may still bring.
-        if (path.bounce > kBouncesBeforeRoulette) {
-            const auto [diffuse, specular] = path.weights(1.0f, 1.0f);
-            const float survival = std::min(1.0f, std::max(max_component(diffuse), max_component(specular)));
-            if (!(sampler.next_1d() < survival)) return;
-            path.to_diffuse /= survival;
-            path.to_specular /= survival;
+        if (path.scattered > kBouncesBeforeRoulette) {
+            const Scattering w = path.weights();
+            if (!path.survives(
+                    std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)}))) {
+                return;
+            }
         }
-        path.ray.origin = offset_origin(surface.position, surface.geometric_normal);
-        path.ray.direction = wi;
-        path.ray.t_min = 0.0f;
-        path.ray.t_max = std::numeric_limits<float>::infinity();
+        path.leave_from(surface.position, surface.geometric_normal, wi);
+        if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
+            path.core = core_at(surface, filled);
+            path.clear = 1.0f;
+            path.volume = bodies_[std::size_t(filled)]->material->volume;
+        }
     }
+}
+
+void PathTracer::deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group,
+                         const Rgb& radiance, Tile& tile) const {
+    if (path.bounce == 0) {
+        tile.add(path.pixel, primary, group, weights.refraction * radiance);
+        return;
+    }
+    const auto add = [&](Component component, const Rgb& weight) {
+        if (weight != Rgb(0.0f)) tile.add(path.pixel, component, group, weight * radiance);
+    };
+    add(Component::diffuse, weights.diffuse);
+    add(Component::specular, weights.specular);
+    add(primary == Component::volume ? Component::volume : Component::refraction, weights.refraction);
 }
 
 // Light that the ray runs into: domes for camera rays, every light with an extent after that, weighted against
 // add_direct_light's choice of the same direction.
-void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) const {
+void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const {
     thread_local std::vector<LightHit> hits;
     hits.clear();
-    lights_.intersect(path.ray.origin, path.ray.direction, t_max, hits);
-    for (const LightHit& hit : hits) {
-        const Light& light = lights_.lights()[hit.light];
-        const std::size_t group = group_of_light_[hit.light];
+    const float t_max = surface ? surface->t : std::numeric_limits<float>::infinity();
+    lights_.intersect(path.receiver, path.ray.origin, path.ray.direction, t_max, hits, path.use);
+    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle,
+                                                     path.ray.direction, t_max, mesh, path.use)) {
+        hits.push_back(mesh);
+    }
+    for (LightHit& hit : hits) {
+        const Light& light = lights_.lights()[std::size_t(hit.light)];
+        const bool is_mesh = std::holds_alternative<MeshLight>(light.shape);
+        const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
-            if (std::holds_alternative<DomeLight>(light.shape)) {
-                tile.add(path.pixel, Component::background, group, hit.radiance);
+            if (t_max < hit.distance) continue;
+            if (is_mesh && !lights_.is_material(hit.light)) {
+                deliver(path, Component::emission, path.weights(), group, hit.radiance, tile);
+            } else if (std::holds_alternative<DomeLight>(light.shape)) {
+                deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
             }
             continue;
         }
-        const float mis = path.last.pdf / (path.last.pdf + hit.pdf);
-        const auto [diffuse, specular] =
-            path.weights(multiplier(light, LightComponent::diffuse), multiplier(light, LightComponent::specular));
-        tile.add(path.pixel, Component::diffuse, group, diffuse * hit.radiance * mis);
-        tile.add(path.pixel, Component::specular, group, specular * hit.radiance * mis);
+        // Lights whose shadows are not plain may shine through what the ray has met: they are asked once, from the vertex.
+        if (!lights_.has_plain_shadow(hit.light) && !is_mesh) {
+            if (path.inside.is_empty() ? path.has_passed : t_max < hit.distance) continue;
+            const Ray shadow{path.ray.origin, path.ray.direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
+            if (path.inside.is_empty()) hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
+        }
+        const float mis = path.is_delta ? 1.0f : path.last.pdf / (path.last.pdf + hit.pdf);
+        const Scattering weights =
+            path.weights(multiplier(light, LightComponent::diffuse), multiplier(light, LightComponent::specular),
+                         multiplier(light, LightComponent::refraction));
+        deliver(path, Component::background, weights, group, hit.radiance * path.light_share * mis, tile);
     }
 }
 
@@ -160,72 +366,235 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
-    const Light& light = lights_.lights()[sample.light];
-    const Rgb diffuse_lobe = value.diffuse * multiplier(light, LightComponent::diffuse);
-    const Rgb specular_lobe = value.specular * multiplier(light, LightComponent::specular);
+    const Light& light = lights_.lights()[std::size_t(sample.light)];
+    Rgb diffuse_lobe = value.diffuse * multiplier(light, LightComponent::diffuse);
+    Rgb specular_lobe = value.specular * multiplier(light, LightComponent::specular);
     if (diffuse_lobe == Rgb(0.0f) && specular_lobe == Rgb(0.0f)) return;
 
     Ray shadow;
     shadow.origin = offset_origin(surface.position, surface.geometric_normal);
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
-    ++tile.rays;
-    if (ray_scene_.is_occluded(shadow)) return;
+    bool is_straight = true;
+    const Rgb visible = visibility(sample.light, shadow, path.inside, tile, is_straight);
+    if (visible == Rgb(0.0f)) return;
+    // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
+    if (!is_straight) specular_lobe = Rgb(0.0f);
 
-    const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
-    const Rgb light_over_pdf = sample.radiance * (mis / sample.pdf);
-    const std::size_t group = group_of_light_[sample.light];
-    Rgb diffuse = diffuse_lobe, specular = specular_lobe;
+    const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
+    const Rgb light_over_pdf = sample.radiance * visible * (mis / sample.pdf);
+    const std::size_t group = group_of_light_[std::size_t(sample.light)];
+    Scattering weights{diffuse_lobe, specular_lobe, Rgb(0.0f), 0.0f};
     if (path.bounce > 0) {
-        const auto [to_diffuse, to_specular] = path.weights(1.0f, 1.0f);
-        diffuse = to_diffuse * (diffuse_lobe + specular_lobe);
-        specular = to_specular * (diffuse_lobe + specular_lobe);
+        weights = path.weights();
+        weights.scale(diffuse_lobe + specular_lobe);
+    } else {
+        weights.scale(path.last.refraction);
     }
-    tile.add(path.pixel, Component::diffuse, group, diffuse * light_over_pdf);
-    tile.add(path.pixel, Component::specular, group, specular * light_over_pdf);
+    tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
+    tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
+    tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
 }
 
-void PathTracer::request_gather(const Path& path, const Surface& surface, const V3f& wo, Sampler& sampler,
-                                Tile& tile) const {
-    const Body* body = bodies_[surface.object].get();
-    if (!body || !body->tree || body->material->translucency == 0.0f) return;
-    const IceMaterial& ice = *body->material;
-
-    const Rgb weight = body->radiance_per_exitance(surface, wo);
-
-    GatherRequest request;
-    request.object = surface.object;
-    request.pixel = path.pixel;
-    request.subset = tile.subset;
-    request.position = surface.position;
-    request.is_primary = path.bounce == 0;
-    if (request.is_primary) {
-        request.weight = weight;
-    } else {
-        const auto [diffuse, specular] = path.weights(1.0f, 1.0f);
-        request.weight = diffuse * weight;
-        request.specular_weight = specular * weight;
+// What is left of a light along a ray; `is_straight` becomes false where a boundary would bend it. Inside ice shadows are
+// plain.
+Rgb PathTracer::visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const {
+    if (lights_.has_plain_shadow(light) || !inside.is_empty()) {
+        return interiors_.visibility(ray, inside, tile.rays, true, &is_straight);
     }
+    ++tile.rays;
+    return shadow_factor(ray_scene_, lights_, light, ray);
+}
 
-    if (ice.compensation.mode == CompensationMode::fill) {
-        const float u_pick = sampler.next_1d();
-        const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
-        const float cosine = surface.normal.dot(sample.direction);
-        Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
-                   sample.distance * (1.0f - 1e-4f)};
-        if (sample.pdf > 0.0f && cosine > 0.0f && surface.geometric_normal.dot(sample.direction) > 0.0f &&
-            !ray_scene_.is_occluded(shadow)) {
-            const Light& light = lights_.lights()[sample.light];
-            const float entering = body->transmittance(cosine, eval_float(ice.roughness, surface.st));
-            request.entering =
-                sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
-            request.entering_group = static_cast<std::uint32_t>(group_of_light_[sample.light]);
+// ---- ice ------------------------------------------------------------------------------------------------------------
+
+PathTracer::Core PathTracer::core_at(const Surface& surface, int body) const {
+    Core core;
+    core.body = body;
+    core.position = surface.position;
+    core.radiance_per_exitance = bodies_[std::size_t(body)]->inner_radiance_per_exitance(surface);
+    return core;
+}
+
+// `odds` is the chance with which the path came here, over what the boundary lets through.
+bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const Core& core,
+                       Sampler& sampler) const {
+    const IceMaterial& ice = *bodies_[surface.object]->material;
+    const float eta = interiors_.eta(crossing.to);
+    const Frame frame(surface.normal);
+    const BoundarySample sample =
+        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface.st), eta,
+                        interiors_.transmission(static_cast<int>(surface.object)), sampler.next_2d());
+    if (!(sample.weight > 0.0f)) return false;
+
+    if (is_index_matched(eta) && path.has_direct_light) {
+        // No boundary: lights that were chosen at the last vertex are seen as through air.
+        path.last.scale(Rgb(sample.weight / odds));
+    } else {
+        path.pass_boundary();
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
+        path.is_delta = true;
+    }
+    path.inside = crossing.beyond;
+    path.core = core;
+    path.clear = ice.refraction;
+    path.volume = ice.volume;
+    path.leave_from(surface.position, -surface.geometric_normal,
+                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+    return true;
+}
+
+// One piece of a path inside ice: what the core gives, what is scattered once, and what is left at its end.
+bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const {
+    const int body = interiors_.filling(path.inside);
+    if (body == InsideOf::kNone) return true;
+    constexpr float kFarAway = 1e18f;
+    const float way = std::min(length, kFarAway);
+    const Medium& medium = bodies_[std::size_t(body)]->material->medium;
+    const Rgb unscattered = exp(medium.sigma_s_prime * -way) * path.clear;
+
+    Rgb once(0.0f);
+    if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
+        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside};
+        const OnceScattered scattered = single_scattering_.sample(segment, sampler, tile.rays);
+        once = scattered.share * path.volume;
+        if (scattered.light >= 0 && scattered.radiance != Rgb(0.0f)) {
+            deliver(path, Component::volume, path.weights(), group_of_light_[std::size_t(scattered.light)],
+                    scattered.radiance * path.volume, tile);
         }
     }
+    request_gather(path, path.core, Rgb(1.0f) - unscattered - once, tile);
+
+    path.last.scale(unscattered * exp(medium.sigma_a * -way));
+    path.clear = 1.0f;
+    const Scattering w = path.weights();
+    const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
+    return left > 0.0f && path.survives(left / kFaint);
+}
+
+// From inside: light of the outside, then reflect or go through.
+bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
+                               Tile& tile) const {
+    const IceMaterial& ice = *bodies_[surface.object]->material;
+    const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
+    if (is_index_matched(eta)) {
+        path.inside = crossing.beyond;
+        path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
+        ++path.straight;
+        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to);
+        return true;
+    }
+    if (path.inner >= kMaxInnerBounces) {
+        request_gather(path, core_at(surface, crossing.from), Rgb(1.0f), tile);
+        return false;
+    }
+    ++path.inner;
+    const float alpha = refraction_alpha(ice, surface.st);
+    if (crossing.to == InsideOf::kNone) add_light_beyond(path, surface, crossing, alpha, sampler, tile);
+
+    const Frame frame(surface.normal);
+    const V3f wo = frame.to_local(-path.ray.direction);
+    const float u_lobe = sampler.next_1d();
+    const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
+    if (sample.is_reflection) {
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
+        path.has_direct_light = false;
+        path.light_share = Rgb(1.0f);
+        path.is_delta = true;
+        path.leave_from(surface.position, surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
+    } else {
+        path.pass_boundary();
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)});
+        path.receive(surface, -surface.geometric_normal, LightUse::refraction);
+        path.is_delta = crossing.to != InsideOf::kNone;
+        path.inside = crossing.beyond;
+        path.leave_from(surface.position, -surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+    }
+    const int body = interiors_.filling(path.inside);
+    if (body != InsideOf::kNone) {
+        path.core = core_at(surface, body);
+        path.volume = bodies_[std::size_t(body)]->material->volume;
+    }
+    return true;
+}
+
+// One light of the outside, seen from inside through the rough boundary, weighted against the path that goes on.
+void PathTracer::add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,
+                                  Sampler& sampler, Tile& tile) const {
+    const float u_pick = sampler.next_1d();
+    const V2f u = sampler.next_2d();
+    Path beyond = path;
+    beyond.pass_boundary();
+    if (lights_.is_empty() || beyond.light_share == Rgb(0.0f)) return;
+    const LightReceiver receiver{surface.position, -surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, u, LightUse::refraction);
+    if (!(sample.pdf > 0.0f) || sample.direction.dot(surface.geometric_normal) >= 0.0f) return;
+    const Frame frame(surface.normal);
+    const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
+    const float value =
+        inner_transmission(frame.to_local(-path.ray.direction), frame.to_local(sample.direction), alpha, eta);
+    if (!(value > 0.0f)) return;
+
+    const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
+                     sample.distance * (1.0f - 1e-4f)};
+    bool is_straight = true;
+    const Rgb visible = visibility(sample.light, shadow, crossing.beyond, tile, is_straight);
+    if (visible == Rgb(0.0f) || !is_straight) return;
+    const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
+    const Light& light = lights_.lights()[std::size_t(sample.light)];
+    Scattering weights = path.weights();
+    weights.scale(Rgb(value * multiplier(light, LightComponent::refraction)));
+    // Before the first lobe the boundary itself is the first.
+    const std::size_t group = group_of_light_[std::size_t(sample.light)];
+    const Rgb radiance = sample.radiance * visible * beyond.light_share * (mis / sample.pdf);
+    deliver(path, Component::refraction, weights, group, radiance, tile);
+}
+
+void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const {
+    if (core.body == InsideOf::kNone) return;
+    const Body& body = *bodies_[std::size_t(core.body)];
+    if (!body.tree || body.material->translucency == 0.0f) return;
+
+    GatherRequest request;
+    request.object = static_cast<std::uint32_t>(core.body);
+    request.pixel = path.pixel;
+    request.subset = tile.subset;
+    request.position = core.position;
+    request.is_primary = core.is_primary;
+    request.entering = core.entering;
+    request.entering_group = core.entering_group;
+    Scattering weights = path.weights();
+    weights.scale(core.radiance_per_exitance * share);
+    request.diffuse = weights.diffuse;
+    request.specular = weights.specular;
+    (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
+    if (weights.sum() == Rgb(0.0f) && !core.is_primary) return;
     tile.requests.push_back(request);
+}
+
+void PathTracer::add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const {
+    const IceMaterial& ice = *body.material;
+    if (ice.compensation.mode != CompensationMode::fill) return;
+    const float u_pick = sampler.next_1d();
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d(), LightUse::translucency);
+    const float cosine = surface.normal.dot(sample.direction);
+    const Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
+                     sample.distance * (1.0f - 1e-4f)};
+    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
+    const Light& light = lights_.lights()[std::size_t(sample.light)];
+    const float entering = body.transmittance(cosine, eval_float(ice.roughness, surface.st));
+    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
+                    (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
+    core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);
 }
 
 void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
@@ -252,12 +621,10 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
             for (std::size_t group = 0; group < gathered.groups; ++group) {
                 Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
                 if (group == request.entering_group) exitance += fill;
-                if (request.is_primary) {
-                    tile.add(request.pixel, Component::translucency, group, exitance * request.weight);
-                } else {
-                    tile.add(request.pixel, Component::diffuse, group, exitance * request.weight);
-                    tile.add(request.pixel, Component::specular, group, exitance * request.specular_weight);
-                }
+                tile.add(request.pixel, Component::translucency, group, exitance * request.translucency);
+                tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
+                tile.add(request.pixel, Component::specular, group, exitance * request.specular);
+                tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
             }
             if (request.is_primary) tile.add_coverage(request.pixel, coverage);
         }

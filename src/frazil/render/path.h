@@ -1,10 +1,11 @@
 // Paths from the camera: what each sample adds to a tile, and which gathers it asks for.
 // Model: unidirectional path tracing with multiple importance sampling of lights and lobes (balance heuristic
-//   [Veach1997]); ice ends in a gather request plus its glossy reflection.
-//   Light goes to the layer of the first lobe that it was scattered by.
-// Units: radiance.
+//   [Veach1997]). Where the camera sees ice a path is split: one part is reflected, the other refracted. Inside ice every
+//   piece of the path sends u = exp(-sigma_s_prime d) of its weight on, absorbed on the way, and asks for a gather with
+//   the rest at its start. Light goes to the layer of the first lobe that it was scattered by.
+// Units: radiance; inside ice radiance over squared index.
 // Valid: thread-safe; a pure function of the ray and the sampler.
-// Not: refraction, volumes.
+// Not: caustics: light reaches surfaces behind ice and in it along straight lines.
 #pragma once
 
 #include <memory>
@@ -14,9 +15,11 @@
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/light_sampling.h"
 #include "frazil/render/bodies.h"
+#include "frazil/render/interior.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
 #include "frazil/render/tile.h"
+#include "frazil/render/volume.h"
 
 namespace frazil {
 
@@ -33,12 +36,34 @@ class PathTracer {
     // Answer the tile's gather requests and forget them.
     void gather(const GatherOptions& options, Tile& tile) const;
 
+    // Each begins with an object's path.
+    const std::vector<std::string>& warnings() const { return interiors_.warnings(); }
+
   private:
     struct Path;
-    void add_lights_on_ray(const Path& path, float t_max, Tile& tile) const;
+    struct Core;
+    // Follow a path to its end; a part that is split off goes to `split`, where there is room for one.
+    void follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
+
+    // Radiance to the layers of the path's first lobe; to `primary` where the camera sees it directly.
+    void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,
+                 Tile& tile) const;
+    void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
-    void request_gather(const Path& path, const Surface& surface, const V3f& wo, Sampler& sampler, Tile& tile) const;
+    Rgb visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const;
+    void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,
+                          Sampler& sampler, Tile& tile) const;
+
+    // Ice: entering it, going on inside, meeting its boundary from inside. False where the path ends.
+    Core core_at(const Surface& surface, int body) const;
+    bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const Core& core,
+               Sampler& sampler) const;
+    bool cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const;
+    bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
+                       Tile& tile) const;
+    void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
+    void add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const;
 
     const Scene& scene_;
     const RayScene& ray_scene_;
@@ -46,6 +71,9 @@ class PathTracer {
     const std::vector<std::unique_ptr<Body>>& bodies_;
     const std::vector<std::size_t>& group_of_light_;
     SurfaceResolver resolver_;
+    Interiors interiors_;
+    SingleScattering single_scattering_;
+    InsideOf camera_inside_;
     int max_bounces_;
 };
 

@@ -17,6 +17,11 @@ void check_material(const Material& material) {
             ice->roughness.value);
     require(ice->specular >= 0.0f && ice->specular <= 1.0f, "specular must be in 0..1", ice->specular);
     require(ice->translucency >= 0.0f && ice->translucency <= 1.0f, "translucency must be in 0..1", ice->translucency);
+    require(ice->refraction >= 0.0f && ice->refraction <= 1.0f, "refraction must be in 0..1", ice->refraction);
+    require(ice->refraction_roughness <= 1.0f, "refraction_roughness must be in 0..1", ice->refraction_roughness);
+    require(ice->volume >= 0.0f && ice->volume <= 1.0f, "volume must be in 0..1", ice->volume);
+    require(ice->anisotropy >= -0.95f && ice->anisotropy <= 0.95f, "anisotropy must be in -0.95..0.95",
+            ice->anisotropy);
     require(ice->compensation.limit >= 1.0f, "compensation_limit must be >= 1", ice->compensation.limit);
     require(ice->compensation.strength >= 0.0f && ice->compensation.strength <= 1.0f,
             "compensation_strength must be in 0..1", ice->compensation.strength);

@@ -33,10 +33,10 @@ Scattering Shader::eval(const V3f& wo, const V3f& wi) const {
     if (local_wi.z <= 0.0f) return {};
     if (standard_) {
         const BsdfValue value = standard_->eval(local_wo, local_wi);
-        return {value.diffuse, value.specular, standard_->pdf(local_wo, local_wi)};
+        return {value.diffuse, value.specular, Rgb(0.0f), standard_->pdf(local_wo, local_wi)};
     }
     const float reflection = dielectric_reflection(local_wo, local_wi, alpha_, *body_->boundary);
-    return {Rgb(0.0f), Rgb(body_->material->specular * reflection), ggx_pdf(local_wo, local_wi, alpha_)};
+    return {Rgb(0.0f), Rgb(body_->material->specular * reflection), Rgb(0.0f), ggx_pdf(local_wo, local_wi, alpha_)};
 }
 
 bool Shader::sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const {

@@ -1,5 +1,6 @@
 // How a surface scatters light: one face over the material models.
-// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection alone (its core answers by gather).
+// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection alone (its core answers by gather and
+//   by refracted rays: path.h).
 // Units: f * cos per steradian.
 // Valid: reflection only: zero where a direction is below the geometric surface.
 #pragma once
@@ -12,10 +13,14 @@
 
 namespace frazil {
 
-// f * cos of the lobes of one pair of directions, and the density with which sample() would choose wi.
+// f * cos of the lobes of one pair of directions, and the density with which sample() would choose wi. Also what these are
+// worth along a path, over that density.
 struct Scattering {
-    Rgb diffuse = Rgb(0.0f), specular = Rgb(0.0f);
+    Rgb diffuse = Rgb(0.0f), specular = Rgb(0.0f), refraction = Rgb(0.0f);
     float pdf = 0.0f;
+
+    Rgb sum() const { return diffuse + specular + refraction; }
+    void scale(const Rgb& factor) { diffuse *= factor, specular *= factor, refraction *= factor; }
 };
 
 // The scattering of one surface, directions in world space.

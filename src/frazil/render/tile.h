@@ -14,10 +14,10 @@
 namespace frazil {
 
 // The additive rows of the AOV table, in its order.
-enum class Component { translucency, diffuse, specular, emission, background };
-inline constexpr std::size_t kComponentCount = 5;
-inline constexpr std::array<const char*, kComponentCount> kComponentNames = {"translucency", "diffuse", "specular",
-                                                                             "emission", "background"};
+enum class Component { translucency, diffuse, specular, refraction, volume, emission, background };
+inline constexpr std::size_t kComponentCount = 7;
+inline constexpr std::array<const char*, kComponentCount> kComponentNames = {
+    "translucency", "diffuse", "specular", "refraction", "volume", "emission", "background"};
 // A pixel's samples are dealt in turn to so many subsets, whose spread tells the noise of all together.
 inline constexpr int kSampleSubsets = 4;
 
@@ -34,9 +34,11 @@ struct GatherRequest {
     std::uint32_t object = 0;
     std::uint32_t pixel = 0;
     int subset = 0;           // of the pixel's samples
-    bool is_primary = false;  // then `weight` is to translucency, else the light goes the way of its first reflection
+    bool is_primary = false;  // seen by the camera itself
     V3f position = V3f(0.0f);
-    Rgb weight = Rgb(0.0f), specular_weight = Rgb(0.0f);  // to translucency or diffuse; to specular
+    // Radiance per exitance, by the layer that it goes to: the primary ice's is translucency, further light goes the way of
+    // its first lobe.
+    Rgb translucency = Rgb(0.0f), diffuse = Rgb(0.0f), specular = Rgb(0.0f), refraction = Rgb(0.0f);
     // Light that enters right here, for the compensation that fills up; its light group.
     Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;

@@ -1,0 +1,216 @@
+#include "frazil/render/interior.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <unordered_map>
+
+#include "frazil/base/error.h"
+#include "frazil/base/random.h"
+
+namespace frazil {
+namespace {
+
+// A mesh whose holes would span more than this part of its surface is open.
+constexpr double kLargestHole = 0.02;
+constexpr int kMostCrossings = 32;
+constexpr float kNothing = 1e-4f;
+constexpr float kFarAway = 1e18f;  // metres; finite, so that 0 times it is 0
+
+struct Enclosure {
+    double volume = 0.0;  // signed by the winding
+    double rim = 0.0;     // length of edges that are not walked both ways
+    double area = 0.0;
+};
+
+// Vertices that lie at the same place are one.
+std::vector<std::uint32_t> welded(const std::vector<V3f>& positions) {
+    struct Key {
+        std::array<std::uint32_t, 3> bits;
+        bool operator==(const Key& other) const { return bits == other.bits; }
+    };
+    struct KeyHash {
+        std::size_t operator()(const Key& key) const { return hash(key.bits[0], key.bits[1], key.bits[2]); }
+    };
+    std::unordered_map<Key, std::uint32_t, KeyHash> known;
+    known.reserve(positions.size());
+    std::vector<std::uint32_t> result(positions.size());
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        const V3f p = positions[i] + V3f(0.0f);  // -0 becomes 0
+        Key key;
+        std::memcpy(key.bits.data(), &p.x, sizeof(key.bits));
+        result[i] = known.try_emplace(key, std::uint32_t(i)).first->second;
+    }
+    return result;
+}
+
+Enclosure enclosure(const Mesh& mesh) {
+    Enclosure result;
+    const std::vector<std::uint32_t> vertex = welded(mesh.positions);
+    std::vector<std::pair<std::uint64_t, int>> edges;  // (low, high) and the way it is walked
+    edges.reserve(3 * mesh.triangles.size());
+    const Box3f box = bounds(mesh);
+    const V3d center(box.center());
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const V3i& t = mesh.triangles[i];
+        const V3d cross = triangle_cross(mesh, i);
+        result.area += 0.5 * cross.length();
+        result.volume += cross.dot(V3d(mesh.positions[std::size_t(t.x)]) - center) / 6.0;
+        for (int k = 0; k < 3; ++k) {
+            const std::uint64_t a = vertex[std::size_t(t[k])], b = vertex[std::size_t(t[(k + 1) % 3])];
+            if (a != b) edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), a < b ? 1 : -1);
+        }
+    }
+    std::sort(edges.begin(), edges.end());
+    for (std::size_t i = 0; i < edges.size();) {
+        int balance = 0;
+        const std::uint64_t edge = edges[i].first;
+        for (; i < edges.size() && edges[i].first == edge; ++i) balance += edges[i].second;
+        const V3f along = mesh.positions[std::size_t(edge >> 32)] - mesh.positions[std::size_t(edge & 0xffffffffU)];
+        result.rim += std::abs(balance) * double(along.length());
+    }
+    return result;
+}
+
+}  // namespace
+
+bool InsideOf::leave(int object) {
+    for (int i = size_ - 1; i >= 0; --i) {
+        if (objects_[std::size_t(i)] != object) continue;
+        for (int k = i; k + 1 < size_; ++k) objects_[std::size_t(k)] = objects_[std::size_t(k + 1)];
+        --size_;
+        return true;
+    }
+    return false;
+}
+
+Interiors::Interiors(const Scene& scene, const RayScene& ray_scene, const SurfaceResolver& resolver,
+                     const std::vector<std::unique_ptr<Body>>& bodies)
+    : scene_(scene),
+      ray_scene_(ray_scene),
+      resolver_(resolver),
+      bodies_(bodies),
+      outward_(bodies.size(), 0.0f),
+      transmission_(bodies.size()) {
+    std::map<std::uint32_t, Enclosure> of_mesh;
+    std::map<float, std::shared_ptr<const TransmissionAlbedo>> of_eta;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i]) continue;
+        const IceMaterial& ice = *bodies[i]->material;
+        if (ice.refraction == 0.0f && ice.volume == 0.0f) continue;
+        const std::uint32_t mesh = scene.objects[i].mesh;
+        if (scene.meshes[mesh].triangles.empty()) continue;
+        auto [found, is_new] = of_mesh.try_emplace(mesh);
+        if (is_new) found->second = enclosure(scene.meshes[mesh]);
+        const Enclosure& shape = found->second;
+        if (shape.rim * shape.rim > kLargestHole * 4.0 * double(kPi) * shape.area || shape.volume == 0.0) {
+            warnings_.push_back(str(scene.objects[i].path,
+                                    ": the mesh must be closed to be seen into, got open edges of ", shape.rim,
+                                    " units. It is rendered without refraction and volume; close its holes, "
+                                    "or set the material's refraction to 0."));
+            continue;
+        }
+        outward_[i] = shape.volume > 0.0 ? 1.0f : -1.0f;
+        auto& transmission = of_eta[ice.medium.eta];
+        if (!transmission) transmission = std::make_shared<TransmissionAlbedo>(ice.medium.eta);
+        transmission_[i] = transmission;
+        is_empty_ = false;
+    }
+}
+
+int Interiors::filling(const InsideOf& inside) const {
+    int best = InsideOf::kNone, priority = 0;
+    for (int i = 0; i < inside.size(); ++i) {
+        const int candidate = bodies_[std::size_t(inside[i])]->material->priority;
+        if (best == InsideOf::kNone || candidate > priority) best = inside[i], priority = candidate;
+    }
+    return best;
+}
+
+Crossing Interiors::cross(const Hit& hit, const V3f& direction, const InsideOf& inside) const {
+    Crossing crossing{inside, filling(inside), InsideOf::kNone};
+    const int object = static_cast<int>(hit.placement);
+    if (direction.dot(hit.geometric_normal) * outward_[hit.placement] < 0.0f) {
+        crossing.beyond.enter(object);
+    } else {
+        crossing.beyond.leave(object);
+    }
+    crossing.to = filling(crossing.beyond);
+    return crossing;
+}
+
+InsideOf Interiors::inside_at(const V3f& position) const {
+    InsideOf inside;
+    if (is_empty_) return inside;
+    // Along a crooked direction, so that no edge of a box or grid lies on the way. What is left without having been
+    // entered is what the place is inside of; the list is kept in the order from outside in.
+    Ray ray{position, V3f(0.3713906f, 0.7427814f, 0.5570860f).normalized()};
+    InsideOf entered;
+    std::vector<int> left;
+    for (int crossings = 0; crossings < 256; ++crossings) {
+        Hit hit;
+        if (!ray_scene_.intersect(ray, hit)) break;
+        if (is_open_to_rays(hit.placement)) {
+            const int object = static_cast<int>(hit.placement);
+            if (ray.direction.dot(hit.geometric_normal) * outward_[hit.placement] < 0.0f) {
+                entered.enter(object);
+            } else if (!entered.leave(object)) {
+                left.push_back(object);
+            }
+        }
+        const V3f place = ray.origin + ray.direction * hit.t;
+        const V3f onward =
+            ray.direction.dot(hit.geometric_normal) > 0.0f ? hit.geometric_normal : -hit.geometric_normal;
+        ray.origin = offset_origin(place, onward);
+    }
+    for (auto object = left.rbegin(); object != left.rend(); ++object) inside.enter(*object);
+    return inside;
+}
+
+Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs, bool* is_straight) const {
+    if (inside.is_empty()) {
+        ++rays;
+        if (!ray_scene_.is_occluded(ray)) return Rgb(1.0f);
+        if (is_empty_) return Rgb(0.0f);
+    }
+    Rgb result(1.0f);
+    Ray rest = ray;
+    for (int crossings = 0; crossings < kMostCrossings; ++crossings) {
+        Hit hit;
+        ++rays;
+        const bool is_hit = ray_scene_.intersect(rest, hit);
+        const float length = std::min(is_hit ? hit.t : rest.t_max, kFarAway);
+        const int body = filling(inside);
+        if (body != InsideOf::kNone) {
+            const Medium& medium = bodies_[std::size_t(body)]->material->medium;
+            result *= exp((medium.sigma_s_prime + (absorbs ? medium.sigma_a : Rgb(0.0f))) * -length);
+        }
+        if (!is_hit) return result;
+        if (!is_open_to_rays(hit.placement) || max_component(result) < kNothing) return Rgb(0.0f);
+
+        const Crossing crossing = cross(hit, rest.direction, inside);
+        const Surface surface = resolver_.resolve(hit, rest.direction);
+        if (crossing.is_boundary() && (crossing.from == InsideOf::kNone) != (crossing.to == InsideOf::kNone)) {
+            const Body& ice = *bodies_[hit.placement];
+            if (is_straight && !is_index_matched(ice.material->medium.eta)) *is_straight = false;
+            const float cosine = std::abs(surface.normal.dot(rest.direction));
+            result *= ice.transmittance(cosine, eval_float(ice.material->roughness, surface.st));
+            // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
+            const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
+            const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));
+            const float narrowing = cosine / std::max(eta2 * cosine_inside, 1e-4f);
+            if (crossing.to == InsideOf::kNone) {
+                result *= narrowing;
+            } else {
+                result *= ice.material->refraction / std::max(narrowing, 1e-4f);
+            }
+        }
+        inside = crossing.beyond;
+        rest.origin = offset_origin(surface.position, -surface.geometric_normal);
+        rest.t_max -= hit.t;
+        if (!(rest.t_max > 0.0f)) return result;
+    }
+    return Rgb(0.0f);
+}
+
+}  // namespace frazil

@@ -1,0 +1,137 @@
+#include "frazil/render/volume.h"
+
+namespace frazil {
+namespace {
+
+// Drawing a place on [0, length] by free path, one channel in three, cut off at the end.
+class FreePath {
+  public:
+    FreePath(const Rgb& sigma_t, float length) : sigma_t_(sigma_t), length_(length) {
+        for (int c = 0; c < 3; ++c) scattered_[c] = -std::expm1(-sigma_t[c] * length);
+    }
+    float sample(float u) const {
+        const int channel = std::min(int(3.0f * u), 2);
+        const float v = 3.0f * u - float(channel);
+        const float t = -std::log1p(-v * scattered_[channel]) / sigma_t_[channel];
+        return std::clamp(t, 0.0f, length_);
+    }
+    float pdf(float t) const {
+        float sum = 0.0f;
+        for (int c = 0; c < 3; ++c) {
+            if (scattered_[c] > 0.0f) sum += sigma_t_[c] * std::exp(-sigma_t_[c] * t) / scattered_[c];
+        }
+        return sum / 3.0f;
+    }
+
+  private:
+    Rgb sigma_t_, scattered_ = Rgb(0.0f);
+    float length_;
+};
+
+// Drawing a place on [0, length] in equal angles about a centre [KullaFajardo2012].
+class EquiAngular {
+  public:
+    EquiAngular(const V3f& origin, const V3f& direction, float length, const V3f& center) {
+        along_ = (center - origin).dot(direction);
+        height_ = std::max((center - origin - direction * along_).length(), 1e-6f);
+        begin_ = std::atan2(-along_, height_);
+        end_ = std::atan2(length - along_, height_);
+        length_ = length;
+    }
+    float sample(float u) const {
+        const float t = along_ + height_ * std::tan(begin_ + (end_ - begin_) * u);
+        return std::clamp(t, 0.0f, length_);
+    }
+    float pdf(float t) const {
+        const float d = t - along_;
+        return end_ > begin_ ? height_ / ((end_ - begin_) * (height_ * height_ + d * d)) : 0.0f;
+    }
+
+  private:
+    float along_, height_, begin_, end_, length_;
+};
+
+bool has_place(const Light& light) {
+    return !std::holds_alternative<DomeLight>(light.shape) && !std::holds_alternative<DistantLight>(light.shape);
+}
+
+float volume_multiplier(const Light& light) {
+    return light.multipliers[static_cast<int>(LightComponent::volume)];
+}
+
+// Optical depth beyond which nothing is looked for.
+constexpr float kDeepest = 20.0f;
+
+}  // namespace
+
+float henyey_greenstein(float cosine, float g) {
+    const float denominator = std::max(1.0f + g * g - 2.0f * g * cosine, 1e-9f);
+    return 0.25f * kInvPi * (1.0f - g * g) / (denominator * std::sqrt(denominator));
+}
+
+V3f sample_henyey_greenstein(const V3f& direction, float g, const V2f& u) {
+    float cosine = 1.0f - 2.0f * u.x;
+    if (std::abs(g) > 1e-3f) {
+        const float s = (1.0f - g * g) / (1.0f + g - 2.0f * g * u.x);
+        cosine = std::clamp((1.0f + g * g - s * s) / (2.0f * g), -1.0f, 1.0f);
+    }
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine)), phi = 2.0f * kPi * u.y;
+    const auto [x, y] = tangent_frame(direction);
+    return (x * (sine * std::cos(phi)) + y * (sine * std::sin(phi)) + direction * cosine).normalized();
+}
+
+OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler, std::uint64_t& rays) const {
+    OnceScattered result;
+    const float u_light = sampler.next_1d();
+    const V2f u_place = sampler.next_2d(), u_direction = sampler.next_2d(), u_share = sampler.next_2d(),
+              u_phase = sampler.next_2d();
+    const IceMaterial& ice = *bodies_[std::size_t(interiors_.filling(segment.inside))]->material;
+    const Rgb sigma_s = ice.medium.sigma_s_prime, sigma_t = sigma_s + ice.medium.sigma_a;
+    if (!(max_component(sigma_s) > 0.0f)) return result;
+    const auto cut = [&](const Rgb& sigma) {
+        return std::min(segment.length, kDeepest / std::min(sigma.x, std::min(sigma.y, sigma.z)));
+    };
+
+    // The light that is scattered once, from one light.
+    const auto body = static_cast<std::uint32_t>(interiors_.filling(segment.inside));
+    const LightPick pick = lights_.pick({segment.origin, V3f(0.0f), body}, u_light, LightUse::volume);
+    result.light = pick.light;
+    if (result.light >= 0) {
+        const Light& light = lights_.lights()[std::size_t(result.light)];
+        const float length = cut(sigma_t);
+        const FreePath free_path(sigma_t, length);
+        float t = 0.0f, density = 0.0f;
+        if (has_place(light)) {
+            const M44f& m = light.light_to_world;
+            const EquiAngular equi(segment.origin, segment.direction, length, V3f(m[3][0], m[3][1], m[3][2]));
+            t = u_place.x < 0.5f ? free_path.sample(u_place.y) : equi.sample(u_place.y);
+            density = 0.5f * (free_path.pdf(t) + equi.pdf(t));
+        } else {
+            t = free_path.sample(u_place.y);
+            density = free_path.pdf(t);
+        }
+        const V3f place = segment.origin + segment.direction * t;
+        const LightSample towards = lights_.sample_one(result.light, place, u_direction);
+        if (towards.pdf > 0.0f && density > 0.0f) {
+            const Rgb reaches = interiors_.visibility(
+                {place, towards.direction, 0.0f, towards.distance * (1.0f - 1e-4f)}, segment.inside, rays);
+            // Light travels along -towards.direction before and -segment.direction after.
+            const float phase = henyey_greenstein(towards.direction.dot(segment.direction), ice.anisotropy);
+            result.radiance = sigma_s * exp(sigma_t * -t) * reaches * towards.radiance *
+                              (phase * volume_multiplier(light) / (density * towards.pdf * pick.probability));
+        }
+    }
+
+    // The share of all that is scattered which is scattered once and then leaves, absorption left out.
+    const FreePath free_path(sigma_s, cut(sigma_s));
+    const float t = free_path.sample(u_share.x), density = free_path.pdf(t);
+    if (density > 0.0f) {
+        const V3f place = segment.origin + segment.direction * t;
+        const V3f away = -sample_henyey_greenstein(-segment.direction, ice.anisotropy, u_phase);
+        const Rgb leaves = interiors_.visibility({place, away}, segment.inside, rays, false);
+        result.share = sigma_s * exp(sigma_s * -t) * leaves / density;
+    }
+    return result;
+}
+
+}  // namespace frazil

@@ -1,0 +1,224 @@
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "chi_square.h"
+#include "frazil/base/quadrature.h"
+#include "frazil/material/transmission.h"
+#include "frazil/render/render.h"
+#include "frazil/translucency/fresnel.h"
+#include "scenes.h"
+
+using namespace frazil;
+using namespace frazil::test;
+
+namespace {
+
+V3f direction(float cosine, float azimuth = 0.0f) {
+    const float sine = std::sqrt(1.0f - cosine * cosine);
+    return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
+}
+
+// Clear ice: no scattering, `sigma_a` absorption.
+Material clear_ice(const Rgb& sigma_a, float eta, float roughness) {
+    Material material = ice(sigma_a, eta, roughness, CompensationMode::conserve);
+    std::get<IceMaterial>(material.model).medium.sigma_s_prime = Rgb(1e-6f);
+    return material;
+}
+
+IceMaterial& model(Scene& scene, std::size_t material = 0) {
+    return std::get<IceMaterial>(scene.materials[material].model);
+}
+
+}  // namespace
+
+TEST_CASE("refraction sampler: directions follow its density, from both sides") {
+    for (const float eta : {1.31f, 1.0f / 1.31f}) {
+        for (const float roughness : {0.35f, 0.7f}) {
+            for (const float cosine : {0.95f, 0.6f}) {
+                CAPTURE(eta);
+                CAPTURE(roughness);
+                CAPTURE(cosine);
+                const float alpha = alpha_from_roughness(roughness);
+                const V3f wo = direction(cosine, 0.4f);
+                V3f axis;
+                if (!refract(wo, V3f(0, 0, 1), eta, axis)) axis = V3f(0, 0, -1);
+                const ChiSquare result = chi_square(
+                    [&](const V2f& u, V3f& wi) {
+                        return refract(wo, ggx_sample_normal(wo, alpha, u), eta, wi) && wi.z < 0.0f;
+                    },
+                    [&](const V3f& wi) { return double(transmission_pdf(wo, wi, alpha, eta)); }, axis,
+                    roughness < 0.5f ? 0.15 : 1.0);
+                CHECK(result.p_value > 1e-3);
+                CHECK(result.mass == doctest::Approx(result.hit_rate).epsilon(0.01));
+            }
+        }
+    }
+}
+
+TEST_CASE("the sampler of the inner boundary: what goes through follows inner_transmission") {
+    const float eta = 1.0f / 1.31f, alpha = alpha_from_roughness(0.5f);
+    const V3f wo = direction(0.85f);
+    V3f axis;
+    REQUIRE(refract(wo, V3f(0, 0, 1), eta, axis));
+    std::uint32_t count = 0;
+    const ChiSquare result = chi_square(
+        [&](const V2f& u, V3f& wi) {
+            Sampler lobe(77, count++, 0);
+            const BoundarySample sample = sample_inner(wo, alpha, eta, lobe.next_1d(), u);
+            wi = sample.wi;
+            CHECK(sample.weight == 1.0f);
+            CHECK(wi.length() == doctest::Approx(1.0).epsilon(1e-3));
+            return !sample.is_reflection;
+        },
+        [&](const V3f& wi) { return double(inner_transmission(wo, wi, alpha, eta)); }, axis, 0.5);
+    CHECK(result.p_value > 1e-3);
+    CHECK(result.mass == doctest::Approx(result.hit_rate).epsilon(0.01));
+}
+
+TEST_CASE("refraction is reciprocal: f / eta² is the same from both sides") {
+    const float alpha = alpha_from_roughness(0.6f), eta = 1.31f;
+    for (std::uint32_t i = 0; i < 64; ++i) {
+        const V3f wo = direction(0.1f + 0.014f * float(i), 0.1f * float(i));
+        V3f wi;
+        if (!refract(wo, ggx_sample_normal(wo, alpha, Sampler(5, i, 0).next_2d()), eta, wi) || wi.z > -0.05f) continue;
+        // Values are f * cos(wi) for radiance over squared index; as seen from the other side up is down.
+        const float there = transmission_eval(wo, wi, alpha, eta) / -wi.z;
+        const float back = transmission_eval(-wi, -wo, alpha, 1.0f / eta) / wo.z;
+        REQUIRE(there > 0.0f);
+        CHECK(there / (eta * eta) == doctest::Approx(back).epsilon(2e-3));
+    }
+}
+
+TEST_CASE(
+    "entering loses nothing: the lobe integrates to one, and single scattering to no more than the transmittance") {
+    const float eta = 1.31f;
+    const TransmissionAlbedo single(eta);
+    const DielectricAlbedo reflection(eta);
+    for (const float roughness : {0.0f, 0.3f, 0.8f}) {
+        for (const float cosine : {1.0f, 0.7f, 0.3f}) {
+            CAPTURE(roughness);
+            CAPTURE(cosine);
+            const float alpha = alpha_from_roughness(roughness);
+            double sum = 0.0;
+            constexpr int kCount = 4096;
+            for (int i = 0; i < kCount; ++i) {
+                Sampler sampler(3, 0, std::uint32_t(i));
+                sum += double(sample_entering(direction(cosine), alpha, eta, single, sampler.next_2d()).weight);
+            }
+            CHECK(sum / kCount == doctest::Approx(1.0).epsilon(5e-3));
+            CHECK(single.eval(cosine, alpha) <= 1.0f - reflection.eval(cosine, alpha) + 5e-3f);
+        }
+    }
+    CHECK(single.eval(1.0f, 1e-4f) == doctest::Approx(1.0f - fresnel_dielectric(1.0f, eta)).epsilon(1e-3));
+}
+
+TEST_CASE("white furnace: clear, cloudy and bubbly ice without absorption is invisible in uniform light") {
+    for (const float sigma_s : {1e-6f, 0.5f, 20.0f}) {
+        for (const float eta : {1.0f, 1.31f}) {
+            for (const float refraction : {0.5f, 1.0f}) {
+                CAPTURE(sigma_s);
+                CAPTURE(eta);
+                CAPTURE(refraction);
+                // What is not seen through has to be scattered by something.
+                if (refraction < 1.0f && sigma_s < 1.0f) continue;
+                Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-7f), eta, 0.3f, CompensationMode::conserve));
+                model(scene).medium.sigma_s_prime = Rgb(sigma_s);
+                model(scene).refraction = refraction;
+                model(scene).volume = 1.0f;
+                scene.lights = {dome(Rgb(1.0f))};
+                RenderOptions options = small();
+                options.samples = 64;
+                const Film film = render(scene, options).film;
+                CHECK(mean_inside(film, "beauty", 0) == doctest::Approx(1.0).epsilon(0.02));
+                CHECK(mean_inside(film, "beauty", 2) == doctest::Approx(1.0).epsilon(0.02));
+            }
+        }
+    }
+}
+
+TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) between two boundaries") {
+    // A box 0.4 m thick; the camera looks along its normal at a white sky.
+    Mesh box;
+    for (const float z : {-0.2f, 0.2f}) {
+        box.positions.insert(box.positions.end(), {{-9, -9, z}, {9, -9, z}, {9, 9, z}, {-9, 9, z}});
+    }
+    box.triangles = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                     {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+    const Rgb sigma_a(3.0f, 1.0f, 0.1f);
+    Scene scene = scene_of(box, clear_ice(sigma_a, 1.31f, 0.0f));
+    model(scene).translucency = 0.0f;
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.focal_length = 2000.0f;
+    RenderOptions options = small();
+    options.width = options.height = 8;
+    options.samples = 256;
+    options.spacing = 2.0f;
+    const auto check = [&](const Scene& seen) {
+        const Film film = render(seen, options).film;
+        const double f = fresnel_dielectric(1.0f, 1.31f);
+        for (int c = 0; c < 3; ++c) {
+            // Both boundaries and all reflections between them.
+            const double t = std::exp(-0.4 * double(sigma_a[c]));
+            const double through = (1 - f) * (1 - f) * t / (1 - f * f * t * t);
+            const double back = (1 - f) * (1 - f) * f * t * t / (1 - f * f * t * t);
+            CHECK(mean_inside(film, "refraction", c) == doctest::Approx(through + back).epsilon(0.01));
+        }
+    };
+    check(scene);
+    SUBCASE("with flipped winding") {
+        for (V3i& t : scene.meshes[0].triangles) std::swap(t.y, t.z);
+        check(scene);
+    }
+    SUBCASE("mirrored") {
+        scene.objects[0].local_to_world[0][0] = -1.0f;
+        check(scene);
+    }
+    SUBCASE("cut in two overlapping bodies") {
+        scene.meshes.push_back(scene.meshes[0]);
+        for (V3f& p : scene.meshes[0].positions) p.z = p.z > 0.0f ? 0.2f : -0.1f;
+        for (V3f& p : scene.meshes[1].positions) p.z = p.z > 0.0f ? 0.1f : -0.2f;
+        scene.mesh_paths.push_back("/other");
+        scene.objects.push_back({"/other", 1, 0, M44f()});
+        check(scene);
+    }
+}
+
+TEST_CASE("a camera inside ice sees the sky through its boundary") {
+    Scene scene = scene_of(sphere(1.0f, 5), clear_ice(Rgb(0.5f), 1.31f, 0.05f));
+    model(scene).translucency = 0.0f;
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.camera_to_world = M44f();
+    const Film film = render(scene, small()).film;
+    // From the centre every ray meets the boundary at normal incidence.
+    const double f = fresnel_dielectric(1.0f, 1.31f), t = std::exp(-0.5);
+    CHECK(mean_inside(film, "refraction", 0) == doctest::Approx((1 - f) * t / (1 - f * t * t)).epsilon(0.02));
+}
+
+TEST_CASE("open ice is rendered as before, with a warning that names it") {
+    Scene scene = scene_of(floor_square(5.0f, 0.0f), clear_ice(Rgb(0.5f), 1.31f, 0.3f));
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.camera_to_world = M44f();
+    scene.camera.camera_to_world.rotate(V3f(-kPi / 2.0f, 0.0f, 0.0f));
+    scene.camera.camera_to_world[3][1] = 2.5f;
+    RenderOptions options = small();
+    options.spacing = 0.2f;
+    const RenderResult result = render(scene, options);
+    bool is_named = false;
+    for (const std::string& warning : result.stats.warnings) {
+        is_named = is_named || warning.find("/shape: the mesh must be closed to be seen into") == 0;
+    }
+    CHECK(is_named);
+    CHECK(mean_inside(result.film, "refraction", 0) == 0.0);
+}
+
+TEST_CASE("the refraction multiplier of a light acts on what is seen through ice alone") {
+    Scene scene = scene_of(sphere(1.0f, 4), clear_ice(Rgb(0.1f), 1.31f, 0.2f));
+    scene.lights = {dome(Rgb(1.0f))};
+    const Film full = render(scene, small()).film;
+    scene.lights[0].multipliers[int(LightComponent::refraction)] = 0.0f;
+    const Film none = render(scene, small()).film;
+    CHECK(mean_inside(full, "refraction", 0) > 0.5);
+    CHECK(mean_inside(none, "refraction", 0) < 1e-6);
+    CHECK(mean_inside(none, "specular", 0) == doctest::Approx(mean_inside(full, "specular", 0)).epsilon(1e-6));
+}
