@@ -28,6 +28,6 @@ def ice_over_floor(key: float = 40.0, sky: float = 0.4, radius: float = 1.0, cam
     lamp = fz.Light(fz.SphereLight(0.2), radiance=(key, key, key), matrix=placed(2, 3, 1), path="/Key", group="key")
     scene.add_light(lamp)
     camera = fz.Camera()
-    camera.matrix = placed(camera_x, 0, 5)
+    camera.matrix = placed(camera_x, 0, 9)
     scene.camera = camera
     return scene

@@ -7,7 +7,7 @@ from small_scenes import ice_over_floor
 import frazil as fz
 from frazil.denoise import denoise_film
 
-OPTIONS = {"spacing": 0.2, "bake_samples": 4, "resolution": (64, 36)}
+OPTIONS = {"spacing": 0.2, "bake_samples": 4, "resolution": (128, 72)}
 
 
 def luminance(film):
@@ -47,14 +47,15 @@ def test_denoised_layers_still_sum_to_the_beauty():
     scene = ice_over_floor()
     noisy = fz.render(scene, samples=4, **OPTIONS)
     film = fz.render(scene, samples=4, denoise=True, **OPTIONS)
-    truth = fz.render(scene, samples=1024, **OPTIONS)
+    truth = fz.render(scene, samples=512, **OPTIONS)
     additive = film.additive_layers()
     np.testing.assert_allclose(sum(film[n] for n in additive), film["beauty"][:, :, :3], rtol=1e-5, atol=1e-6)
     for name, groups in additive.items():
         np.testing.assert_allclose(sum(film[g] for g in groups), film[name], rtol=1e-5, atol=1e-6)
     np.testing.assert_array_equal(film["translucency"], noisy["translucency"])
-    error = [np.sqrt(np.mean((f["diffuse"] - truth["diffuse"]) ** 2)) for f in (noisy, film)]
-    assert error[1] < 0.6 * error[0]
+    for name in ("diffuse", "specular"):
+        before, after = (np.sqrt(np.mean((f[name] - truth[name]) ** 2)) for f in (noisy, film))
+        assert after < 0.7 * before, name
 
 
 def test_negative_light_stays_negative():

@@ -187,7 +187,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
                 const V2f u = sampler.next_2d();
                 const float image_x = (x + 0.5f + filter.offset(u.x)) / options.width;
                 const float image_y = (y + 0.5f + filter.offset(u.y)) / options.height;
-                tile.subset = sample % kSampleSubsets;
+                tile.subset = subset_of(sample);
                 ++tile.camera_rays;
                 tracer.trace(camera_ray(scene.camera, image_x, image_y, aspect), view_axis, sampler, tile_pixel, tile);
             }
