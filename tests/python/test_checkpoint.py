@@ -80,7 +80,7 @@ WORKER = """
 
 
 def test_kill_in_a_loop_loses_no_more_than_the_last_interval(tmp_path):
-    options = {**OPTIONS, "samples": 1500}
+    options = {**OPTIONS, "samples": 1000}
     path, exr = tmp_path / "a.checkpoint", tmp_path / "a.exr"
     here = os.path.dirname(__file__)
     code = textwrap.dedent(WORKER.format(here=here, path=str(path), exr=str(exr), options=options))
