@@ -6,17 +6,19 @@ Units: metres; seconds in the stats, bytes for `peak_memory`.
 Not: reading scenes and writing files.
 """
 
+import json
 import resource
 import sys
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from . import _frazil
+from .aovs import chosen_aovs
 from .film import Film
 from .version import version
 from .warning import FrazilWarning
@@ -44,6 +46,7 @@ def render(
     tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
+    aovs: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Film:
     """Render a scene.
@@ -81,6 +84,8 @@ def render(
         ``noise_free`` or ``sum``.
     pixel_filter : str
         ``blackman_harris`` or ``box``.
+    aovs : sequence of str
+        Layers of the AOV table to make beside those that are made anyway; see docs/aovs.md.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` with fraction in [0, 1], from any thread. What it raises stops the
         render and is raised here.
@@ -96,6 +101,8 @@ def render(
         For a scene or options out of range; the message begins with the object's path.
     MemoryError
         Where the picture would not fit into the memory that is free.
+    KeyError
+        For an unknown AOV; the message has the nearest.
     KeyboardInterrupt
         On Ctrl-C, at the next tile.
 
@@ -121,6 +128,7 @@ def render(
         "tolerance": tolerance,
         "estimator": estimator,
         "filter": pixel_filter,
+        "aovs": chosen_aovs(aovs),
     }
     _refuse_what_cannot_fit(*resolution)
     core = _core_options(options)
@@ -128,7 +136,8 @@ def render(
     stats = {**result.stats, "peak_memory": peak_memory()}
     for message in stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
-    return Film(result.layers, _provenance(scene, options, stats), stats)
+    metadata = _provenance(scene, options, stats) | _what_layers_hold(result)
+    return Film(result.layers, metadata, stats)
 
 
 def _core_options(options: dict[str, Any]) -> _frazil.RenderOptions:
@@ -157,6 +166,15 @@ def _provenance(scene: Any, options: dict[str, Any], stats: dict[str, Any]) -> d
         "frazil:dropped_samples": int(stats.get("dropped_samples", 0)),
     }
     return origin | {f"frazil:{name}": value for name, value in options.items() if name not in ("width", "height")}
+
+
+def _what_layers_hold(result: Any) -> dict[str, Any]:
+    """What a later change of the layers needs to know of them."""
+    knots = list(result.ramp_knots)
+    return {
+        "frazil:light_groups": [name or "default" for name in result.light_groups],
+        "frazil:ramp_knots": json.dumps(knots) if knots else None,
+    }
 
 
 def _refuse_what_cannot_fit(width: int, height: int) -> None:

@@ -46,9 +46,12 @@ struct GatherRequest {
 
 class Tile {
   public:
-    Tile(std::size_t pixels, std::size_t groups)
+    // `planes` of translucency beside the components: see FilmLayout.
+    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0)
         : groups_(groups),
+          plane_count_(planes),
           light_(pixels * kComponentCount * groups, Rgb(0.0f)),
+          planes_(pixels * planes * groups, Rgb(0.0f)),
           luminance_(pixels * kSampleSubsets),
           normal_(pixels, V3f(0.0f)),
           albedo_(pixels, Rgb(0.0f)),
@@ -63,6 +66,10 @@ class Tile {
         }
         light_[(pixel * kComponentCount + static_cast<std::size_t>(component)) * groups_ + group] += radiance;
         luminance_[pixel * kSampleSubsets + subset] += luminance(radiance);
+    }
+
+    void add_to_plane(std::size_t pixel, std::size_t plane, std::size_t group, const Rgb& radiance) {
+        if (is_finite(radiance)) planes_[(pixel * plane_count_ + plane) * groups_ + group] += radiance;
     }
 
     void add_primary(std::size_t pixel, const PrimaryHit& hit) {
@@ -81,6 +88,10 @@ class Tile {
         return luminance_[pixel * kSampleSubsets + of_subset];
     }
     const Rgb& albedo(std::size_t pixel) const { return albedo_[pixel]; }
+    // One value per light group.
+    const Rgb* plane(std::size_t pixel, std::size_t plane) const {
+        return &planes_[(pixel * plane_count_ + plane) * groups_];
+    }
     const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
     const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
     std::uint32_t hits(std::size_t pixel) const { return hits_[pixel]; }
@@ -91,8 +102,8 @@ class Tile {
     std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
   private:
-    std::size_t groups_;
-    std::vector<Rgb> light_;
+    std::size_t groups_, plane_count_;
+    std::vector<Rgb> light_, planes_;
     std::vector<float> luminance_;
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;
