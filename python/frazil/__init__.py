@@ -48,7 +48,9 @@ from .warning import FrazilWarning
 # Names that need more than the core, and where they live: imported when first asked for.
 _LAZY = {
     "Film": ".film",
+    "Recipe": ".grade_recipe",
     "UsdScene": ".usd",
+    "grade": ".grading",
     "load_usd": ".usd",
     "poisson_points": ".points",
     "read_meshes": ".usd",
@@ -79,6 +81,7 @@ __all__ = [
     "PointTree",
     "Ramp",
     "RayScene",
+    "Recipe",
     "RectLight",
     "Scene",
     "ShadowRules",
@@ -92,6 +95,7 @@ __all__ = [
     "bake_irradiance",
     "fresnel_average",
     "fresnel_dielectric",
+    "grade",
     "light_groups",
     "load_usd",
     "point_statistics",

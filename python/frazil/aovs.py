@@ -4,11 +4,14 @@ Model: one table (src/frazil/render/aov.cpp) drives film, EXR, command line, Usd
 Not: making the layers.
 """
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
-__all__ = ["aov_names", "aov_table", "chosen_aovs", "unknown_name"]
+__all__ = ["ALL", "aov_names", "aov_table", "chosen_aovs", "layers_of", "unknown_name"]
+
+ALL = "all"  # stands for every AOV that is made without being asked for
 
 
 def aov_table() -> list[dict[str, Any]]:
@@ -36,12 +39,34 @@ def chosen_aovs(names: Iterable[str]) -> list[str]:
     known = aov_names()
     chosen: list[str] = []
     for name in names:
+        if name == ALL:
+            continue
         if name not in known:
             raise KeyError(unknown_name("aovs", name, known))
         if name in chosen:
             raise ValueError(f"aovs: names must differ from each other, got {name!r} twice.")
         chosen.append(name)
     return chosen
+
+
+def layers_of(names: Iterable[str], film: Mapping[str, Any]) -> list[str]:
+    """The layers of a film that AOVs stand for: themselves, and by light group, knot of a ramp, rank of a Cryptomatte.
+
+    Raises
+    ------
+    KeyError
+        For an AOV of which the film has nothing.
+    """
+    groups = getattr(film, "metadata", {}).get("frazil:light_groups") or []
+    tails = ["", *(f"_{group}" for group in groups)]
+    layers: dict[str, None] = {}
+    for name in names:
+        pattern = re.compile(re.escape(name) + r"\d*(" + "|".join(map(re.escape, tails)) + ")")
+        own = [layer for layer in film if pattern.fullmatch(layer)]
+        if not own:
+            raise KeyError(unknown_name("Film: layer", name, list(film)))
+        layers |= dict.fromkeys(own)
+    return list(layers)
 
 
 def unknown_name(what: str, name: str, known: Sequence[str]) -> str:

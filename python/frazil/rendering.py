@@ -173,6 +173,8 @@ def _what_layers_hold(result: Any) -> dict[str, Any]:
     knots = list(result.ramp_knots)
     return {
         "frazil:light_groups": [name or "default" for name in result.light_groups],
+        "frazil:additive": [row["name"] for row in _frazil.aov_table() if row["is_additive"]],
+        "frazil:compensation": json.dumps(list(result.compensations)),
         "frazil:ramp_knots": json.dumps(knots) if knots else None,
     }
 

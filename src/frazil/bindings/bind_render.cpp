@@ -57,6 +57,19 @@ nb::list knots_of(const Film& film) {
     return knots;
 }
 
+nb::list compensations_of(const Film& film) {
+    nb::list rows;
+    constexpr const char* kNames[] = {"off", "ratio", "conserve", "fill", "linear"};
+    for (const RenderedCompensation& rendered : film.compensations) {
+        nb::dict row;
+        row["material"] = rendered.material;
+        row["mode"] = kNames[static_cast<int>(rendered.compensation.mode)];
+        row["strength"] = rendered.compensation.strength;
+        rows.append(row);
+    }
+    return rows;
+}
+
 nb::dict stats_of(const RenderStats& stats) {
     nb::dict result;
     result["points"] = stats.points;
@@ -243,6 +256,9 @@ void bind_render(nb::module_& module) {
             "ramp_knots", [](const RenderResult& self) { return knots_of(self.film); },
             "list of dict, one per layer translucency_ramp<K>: material, distance (metres), color, share of energy, "
             "...")
+        .def_prop_ro(
+            "compensations", [](const RenderResult& self) { return compensations_of(self.film); },
+            "list of dict, one per material of ice: material, mode, strength.")
         .def_prop_ro(
             "stats", [](const RenderResult& self) { return stats_of(self.stats); },
             "dict: points, nodes, rays, gathers, dropped samples, seconds per stage.");

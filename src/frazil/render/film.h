@@ -10,6 +10,7 @@
 
 #include "frazil/base/vec.h"
 #include "frazil/render/aov.h"
+#include "frazil/translucency/compensation.h"
 
 namespace frazil {
 
@@ -30,11 +31,18 @@ struct RampKnot {
     bool is_fixed = false;  // not a knot: a material without a ramp, or what the compensation `fill` adds
 };
 
+// The area compensation that a material of ice was rendered with.
+struct RenderedCompensation {
+    std::string material;  // its path
+    Compensation compensation;
+};
+
 struct Film {
     int width = 0, height = 0;
     std::map<std::string, Layer> layers;  // by AOV name
     std::vector<std::string> groups;      // of lights, in the order of the layers; "" for lights without one
     std::vector<RampKnot> knots;          // by number of the layer; empty where the layers were not asked for
+    std::vector<RenderedCompensation> compensations;
 };
 
 }  // namespace frazil

@@ -117,6 +117,13 @@ FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_ao
         if (is_needed) layout.groups.emplace_back();
     }
 
+    std::vector<char> is_known(scene.materials.size(), 0);
+    for (const Object& object : scene.objects) {
+        const Material& material = scene.materials[object.material];
+        const auto* ice = std::get_if<IceMaterial>(&material.model);
+        if (ice && !is_known[object.material]) layout.compensations.push_back({material.path, ice->compensation});
+        is_known[object.material] = 1;
+    }
     if (layout.has("translucency_ramp")) add_knots(scene, layout);
     for (const ModeName& named : kModes) {
         if (layout.has(named.aov)) layout.modes.push_back(named.mode);

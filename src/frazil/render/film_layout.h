@@ -18,6 +18,8 @@ struct FilmLayout {
     std::vector<std::string> groups;  // one at least
     std::size_t emission_group = 0;   // which takes light that surfaces emit
 
+    std::vector<RenderedCompensation> compensations;  // one per material of ice that is in use
+
     // Planes: knots first, then modes.
     std::vector<RampKnot> knots;
     std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers

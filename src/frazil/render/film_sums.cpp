@@ -34,6 +34,7 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     film_.height = height;
     film_.groups = layout.groups;
     film_.knots = layout.knots;
+    film_.compensations = layout.compensations;
     for (const char* component : kComponentNames) components_.push_back(add_grouped(component));
     for (std::size_t p = 0; p < layout.plane_count(); ++p) planes_.push_back(add_grouped(layout.plane_name(p)));
     beauty_ = utility("beauty"), depth_ = utility("Z"), object_id_ = utility("object_id");
