@@ -6,8 +6,10 @@ Valid: all numbers finite; an unknown key is refused with the nearest that there
 Not: whether the picture has the layers: grading.py.
 """
 
+import json
 import math
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +24,17 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["ColorCorrection", "Compensation", "Matte", "Mix", "RampChange", "Recipe", "read_recipe"]
+__all__ = [
+    "MODES",
+    "ColorCorrection",
+    "Compensation",
+    "Matte",
+    "Mix",
+    "RampChange",
+    "Recipe",
+    "read_recipe",
+    "recipe_text",
+]
 
 MODES = ("off", "ratio", "conserve", "fill", "linear")
 
@@ -122,6 +134,35 @@ def read_recipe(source: "str | os.PathLike | Mapping[str, Any] | Recipe") -> Rec
         return _recipe(tomllib.loads(path.read_text(encoding="utf-8")), str(path))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: recipe must be TOML: {error}.") from None
+
+
+def recipe_text(recipe: Mapping[str, Any]) -> str:
+    """A recipe dict as TOML: tables of tables, whose values are numbers, texts and lists."""
+    lines: list[str] = []
+
+    def write(table: Mapping[str, Any], path: tuple[str, ...]) -> None:
+        values = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
+        if values and path:
+            lines.append(("\n" if lines else "") + f"[{'.'.join(_toml_key(part) for part in path)}]")
+        lines.extend(f"{_toml_key(key)} = {_toml_value(value)}" for key, value in values.items())
+        for key, value in table.items():
+            if isinstance(value, Mapping):
+                write(value, (*path, key))
+
+    write(recipe, ())
+    return "\n".join(lines) + "\n"
+
+
+def _toml_key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, float):
+        return repr(float(f"{value:.6g}"))
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
+    return json.dumps(value)
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------

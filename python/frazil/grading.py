@@ -18,10 +18,10 @@ import numpy as np
 from .aovs import aov_table
 from .film import Film
 from .grade_color import correct
-from .grade_recipe import Compensation, Matte, RampChange, Recipe, read_recipe
+from .grade_recipe import MODES, Compensation, Matte, RampChange, Recipe, read_recipe
 from .warning import FrazilWarning
 
-__all__ = ["grade"]
+__all__ = ["Lights", "grade"]
 
 
 def grade(
@@ -66,7 +66,7 @@ def grade(
     recipe = read_recipe(recipe)
     if not isinstance(film, Film):
         film = Film.load(film, keep_half=True)
-    lights = _Lights(film, recipe)
+    lights = Lights(film, recipe)
     rgb = lights.beauty()
     correct(rgb, recipe.color)
     for name, matte in recipe.mattes.items():
@@ -86,10 +86,11 @@ def grade(
 # ---- light -----------------------------------------------------------------------------------------------------------
 
 
-class _Lights:
+class Lights:
     """The additive layers of a film, and what a recipe makes of each."""
 
-    def __init__(self, film: Film, recipe: Recipe):
+    def __init__(self, film: Film, recipe: "Recipe | Mapping[str, Any]"):
+        recipe = read_recipe(recipe)
         if "beauty" not in film:
             raise ValueError("grade: picture must have a beauty (R, G, B), got none. Add beauty to --aov.")
         self.film, self.recipe = film, recipe
@@ -103,13 +104,7 @@ class _Lights:
 
     def beauty(self) -> np.ndarray:
         """(H, W, 3) float32: the sum of all light, graded."""
-        terms: list[tuple[str, np.ndarray]] = []
-        for component in self.components:
-            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
-                continue
-            terms += self._terms(component)
-        if self.recipe.ramp or self.recipe.compensation:
-            terms += self._translucency_terms()
+        terms = self.terms()
         if all(np.all(weight == 1.0) for _, weight in terms):
             return self.film["beauty"][:, :, :3].astype(np.float32)
         if self.is_complete:
@@ -118,6 +113,16 @@ class _Lights:
         changed = self._sum([(name, weight - 1.0) for name, weight in terms if np.any(weight != 1.0)])
         changed += self.film["beauty"][:, :, :3]
         return changed
+
+    def terms(self) -> list[tuple[str, np.ndarray]]:
+        """The layers that sum to the graded beauty, each with its (3,) weight."""
+        terms: list[tuple[str, np.ndarray]] = []
+        for component in self.components:
+            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
+                terms += self._translucency_terms()
+            else:
+                terms += self._terms(component)
+        return terms
 
     def graded_layers(self) -> dict[str, np.ndarray]:
         """Every additive layer and plane of translucency, graded."""
@@ -141,8 +146,6 @@ class _Lights:
         if len(names) > 1:
             parts["translucency"] = sum(parts.values())
         return parts
-
-    # A term is a layer's name and its (3,) weight.
 
     def _terms(self, component: str) -> list[tuple[str, np.ndarray]]:
         parts = self._parts(component)
@@ -235,7 +238,7 @@ class _Lights:
         ones = np.ones(3)
         if change.mode is not None:
             strength = 0.0 if change.mode == "off" else 1.0 if change.strength is None else change.strength
-            shares = [(f"translucency_{change.mode}", strength * ones), ("translucency_off", (1.0 - strength) * ones)]
+            shares = [(f"compensation_{change.mode}", strength * ones), ("compensation_off", (1.0 - strength) * ones)]
         else:
             strength = 1.0 if change.strength is None else change.strength
             rendered = _json(self.film, "frazil:compensation") or []
@@ -245,7 +248,7 @@ class _Lights:
                     "grade: compensation must have a mode, as the picture was not rendered with one strength above 0."
                 )
             relative = strength / strengths.pop()
-            shares = [("translucency", relative * ones), ("translucency_off", (1.0 - relative) * ones)]
+            shares = [("translucency", relative * ones), ("compensation_off", (1.0 - relative) * ones)]
         return [(name, share) for name, share in shares if np.any(share != 0.0)]
 
     # ---- what the film must have ----
@@ -254,7 +257,7 @@ class _Lights:
         """All layers that are light: those that a graded picture has no use for."""
         tops = set(self.components)
         tops |= {f"translucency_ramp{k}" for k in range(len(self.knots))}
-        tops |= {row["name"] for row in aov_table() if row["name"].startswith("translucency_")}
+        tops |= {f"compensation_{mode}" for mode in MODES}
         names = tops | {f"{top}_{group}" for top in tops for group in self.groups}
         return {name for name in names if name in self.film}
 

@@ -17,7 +17,16 @@ import numpy as np
 
 from .replacing import replacing
 
-__all__ = ["COMPRESSIONS", "channel_names", "display_rgb", "read_exr", "read_header", "write_exr", "write_png"]
+__all__ = [
+    "COMPRESSIONS",
+    "channel_names",
+    "display_rgb",
+    "read_exr",
+    "read_header",
+    "read_picture",
+    "write_exr",
+    "write_png",
+]
 
 # Attributes that writing sets itself, whatever the picture that was read had.
 _OWN_ATTRIBUTES = ("compression", "name", "chunkCount", "dataWindow", "displayWindow")
@@ -437,3 +446,40 @@ def write_png(path: str | os.PathLike, linear: np.ndarray) -> str:
             closed = output.close()
         _check(closed, output)
     return transform
+
+
+# ---- any picture -----------------------------------------------------------------------------------------------------
+
+
+def read_picture(path: str | os.PathLike, *, is_data: bool = False) -> np.ndarray:
+    """Read the colour of an image of any format as linear light.
+
+    Parameters
+    ----------
+    path : path-like
+        Formats of whole numbers (PNG, JPEG, TIFF) are decoded from sRGB, unless `is_data`; EXR and HDR are linear.
+    is_data : bool
+        Values are no colours: nothing is decoded.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Grey in all three where the image has fewer channels.
+
+    Raises
+    ------
+    OSError
+        Naming `path`, for a file that is missing, truncated or no image.
+    """
+    with _opened(path) as source:
+        spec = source.spec()
+        pixels = source.read_image("float")
+        if pixels is None or source.has_error:
+            raise OSError(f"{path}: must be a whole image: {_one_line(source.geterror())}")
+    pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+    if {"R", "G", "B"} <= set(spec.channelnames):
+        pixels = pixels[:, :, [spec.channelnames.index(name) for name in "RGB"]]
+    pixels = pixels[:, :, :3] if pixels.shape[2] >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
+    if is_data or str(spec.format) in ("half", "float", "double"):
+        return np.ascontiguousarray(pixels)
+    return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4).astype(np.float32)

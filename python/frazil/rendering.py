@@ -19,6 +19,7 @@ import numpy as np
 
 from . import _frazil
 from .aovs import chosen_aovs
+from .cryptomatte import scene_headers
 from .film import Film
 from .version import version
 from .warning import FrazilWarning
@@ -136,7 +137,7 @@ def render(
     stats = {**result.stats, "peak_memory": peak_memory()}
     for message in stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
-    metadata = _provenance(scene, options, stats) | _what_layers_hold(result)
+    metadata = _provenance(scene, options, stats) | _what_layers_hold(result) | scene_headers(scene, aovs)
     return Film(result.layers, metadata, stats)
 
 

@@ -32,6 +32,7 @@ def app() -> Callable[..., Any]:
     """The command line as a callable that takes ``args``, ``prog_name`` and ``standalone_mode``."""
     from .grade import grade_command
     from .info import info_command
+    from .match import match_command
     from .render import render_command
 
     commands = typer.Typer(add_completion=False, no_args_is_help=False, rich_markup_mode="rich")
@@ -42,5 +43,6 @@ def app() -> Callable[..., Any]:
 
         commands.command("points")(points_command)
     commands.command("grade")(grade_command)
+    commands.command("match")(match_command)
     commands.command("info")(info_command)
     return typer.main.get_command(commands).main

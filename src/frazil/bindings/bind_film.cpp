@@ -1,4 +1,7 @@
+#include <nanobind/stl/string_view.h>
+
 #include "frazil/bindings/bindings.h"
+#include "frazil/render/cryptomatte.h"
 #include "frazil/render/mix.h"
 
 namespace frazil {
@@ -40,6 +43,8 @@ void mix_from_python(const std::vector<AnyArray>& layers, const FloatArray& weig
 }  // namespace
 
 void bind_film(nb::module_& module) {
+    module.def("cryptomatte_hash", &murmur3_32, "name"_a, "MurmurHash3_32 of a name, as Cryptomatte has it.");
+    module.def("cryptomatte_id", &cryptomatte_id, "name"_a, "The float32 that stands for a name in a Cryptomatte.");
     module.def("mix_layers", &mix_from_python, "layers"_a, "weights"_a, "out"_a,
                "Write the weighted sum of (H, W, 3) layers, float16 or float32, to the float32 array `out`.\n"
                "weights: (layers, 3), per channel.");

@@ -5,6 +5,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/lighting/irradiance.h"
+#include "frazil/render/cryptomatte.h"
 
 namespace frazil {
 namespace {
@@ -13,11 +14,11 @@ struct ModeName {
     CompensationMode mode;
     const char* aov;
 };
-constexpr ModeName kModes[] = {{CompensationMode::off, "translucency_off"},
-                               {CompensationMode::ratio, "translucency_ratio"},
-                               {CompensationMode::conserve, "translucency_conserve"},
-                               {CompensationMode::fill, "translucency_fill"},
-                               {CompensationMode::linear, "translucency_linear"}};
+constexpr ModeName kModes[] = {{CompensationMode::off, "compensation_off"},
+                               {CompensationMode::ratio, "compensation_ratio"},
+                               {CompensationMode::conserve, "compensation_conserve"},
+                               {CompensationMode::fill, "compensation_fill"},
+                               {CompensationMode::linear, "compensation_linear"}};
 
 // Does the object emit light that belongs to no light?
 bool emits(const Scene& scene, std::size_t object) {
@@ -62,12 +63,34 @@ void add_knots(const Scene& scene, FilmLayout& layout) {
     layout.knots.push_back({"", 0.0f, Rgb(1.0f), Rgb(1.0f), false, true});
 }
 
-// Would the layers of a group of this name be taken for others: translucency_ramp0, translucency_off, ...?
+// Would the layers of a group of this name be taken for those of a ramp's knots?
 bool is_taken(const std::string& group) {
     if (find_aov("translucency_" + group)) return true;
     const std::string_view ramp = "ramp";
     return group.compare(0, ramp.size(), ramp) == 0 && group.size() > ramp.size() &&
            std::isdigit(static_cast<unsigned char>(group[ramp.size()]));
+}
+
+void add_ids(const Scene& scene, FilmLayout& layout) {
+    std::vector<std::uint32_t> placed(scene.meshes.size(), 0);
+    for (const Object& object : scene.objects) {
+        layout.material_id.push_back(1.0f + static_cast<float>(object.material));
+        layout.instance_id.push_back(static_cast<float>(++placed[object.mesh]));
+    }
+    layout.point_spacing.assign(scene.objects.size(), 0.0f);
+    const auto add = [&](const std::string& kind, const auto& name_of) {
+        for (const bool seen_through : {false, true}) {
+            const std::string name = (seen_through ? "crypto_refracted_" : "crypto_") + kind;
+            if (!layout.has(name)) continue;
+            FilmLayout::Ids ids{name, seen_through, {}};
+            for (const Object& object : scene.objects) ids.of_object.push_back(cryptomatte_id(name_of(object)));
+            layout.ids.push_back(std::move(ids));
+        }
+    };
+    add("object", [](const Object& object) -> const std::string& { return object.path; });
+    add("material", [&](const Object& object) -> const std::string& { return scene.materials[object.material].path; });
+    add("asset",
+        [](const Object& object) -> const std::string& { return object.asset.empty() ? object.path : object.asset; });
 }
 
 }  // namespace
@@ -124,6 +147,7 @@ FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_ao
         if (ice && !is_known[object.material]) layout.compensations.push_back({material.path, ice->compensation});
         is_known[object.material] = 1;
     }
+    add_ids(scene, layout);
     if (layout.has("translucency_ramp")) add_knots(scene, layout);
     for (const ModeName& named : kModes) {
         if (layout.has(named.aov)) layout.modes.push_back(named.mode);

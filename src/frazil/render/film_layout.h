@@ -20,6 +20,17 @@ struct FilmLayout {
 
     std::vector<RenderedCompensation> compensations;  // one per material of ice that is in use
 
+    // Cryptomattes: layers <aov>00, 01, 02.
+    struct Ids {
+        std::string aov;
+        bool seen_through;             // ice, or directly
+        std::vector<float> of_object;  // by object
+    };
+    std::vector<Ids> ids;
+
+    // By object: 1 + its material, 1 + its number among those of its mesh, the spacing of its points (bodies fill it in).
+    std::vector<float> material_id, instance_id, point_spacing;
+
     // Planes: knots first, then modes.
     std::vector<RampKnot> knots;
     std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers

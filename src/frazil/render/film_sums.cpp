@@ -40,7 +40,11 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     beauty_ = utility("beauty"), depth_ = utility("Z"), object_id_ = utility("object_id");
     normal_ = utility("N"), position_ = utility("P"), coverage_ = utility("coverage"), albedo_ = utility("albedo");
     sample_count_ = utility("sample_count"), variance_ = utility("variance");
+    uv_ = utility("uv"), local_position_ = utility("Pref"), material_id_ = utility("material_id");
+    instance_id_ = utility("instance_id"), point_spacing_ = utility("point_spacing");
+    lacking_ = utility("compensation_factor");
     const std::size_t count = std::size_t(width) * height;
+    id_slots_.assign(layout.ids.size(), std::vector<float>(count * kIdSlots * 2, 0.0f));
     std::fill(depth_, depth_ + count, std::numeric_limits<float>::infinity());
     samples_.assign(count, 0.0f);
     subsets_.assign(count * kSampleSubsets, 0.0f);
@@ -108,6 +112,17 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
         set(position_, film_pixel, nearest.position);
         depth_[film_pixel] = nearest.depth;
         object_id_[film_pixel] = static_cast<float>(nearest.object_id);
+        const std::size_t object = nearest.object_id - 1;
+        if (uv_) uv_[2 * film_pixel] = nearest.st.x, uv_[2 * film_pixel + 1] = nearest.st.y;
+        if (local_position_) set(local_position_, film_pixel, nearest.local_position);
+        if (material_id_) material_id_[film_pixel] = layout_.material_id[object];
+        if (instance_id_) instance_id_[film_pixel] = layout_.instance_id[object];
+        if (point_spacing_) point_spacing_[film_pixel] = layout_.point_spacing[object];
+    }
+    if (lacking_) increase(lacking_, film_pixel, tile.lacking(tile_pixel));
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) {
+        const FilmLayout::Ids& ids = layout_.ids[i];
+        add_ids(tile.objects(tile_pixel, ids.seen_through), ids.of_object, &id_slots_[i][film_pixel * kIdSlots * 2]);
     }
     samples_[film_pixel] += static_cast<float>(samples);
 }
@@ -186,6 +201,7 @@ Film FilmSums::finish() {
             scale(normal_, i, hits > 0.0f ? 1.0f / hits : 0.0f);
             scale(albedo_, i, factor);
             scale(coverage_, i, factor);
+            if (lacking_) scale(lacking_, i, factor);
             float* pixel = beauty_ + 4 * i;
             pixel[0] = beauty.x, pixel[1] = beauty.y, pixel[2] = beauty.z, pixel[3] = hits * factor;
             sample_count_[i] = samples_[i];
@@ -193,12 +209,30 @@ Film FilmSums::finish() {
             variance_[i] = std::isfinite(variance) ? variance : 0.0f;
         }
     });
+    finish_ids();
     return std::move(film_);
+}
+
+// Three layers of two ranks for each Cryptomatte.
+void FilmSums::finish_ids() {
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) {
+        std::array<float*, kIdRanks / 2> layers;
+        for (int k = 0; k < kIdRanks / 2; ++k) layers[k] = add_layer(str(layout_.ids[i].aov, "0", k), 4);
+        parallel_for(samples_.size(), kRowsPerChunk * film_.width, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t pixel = begin; pixel < end; ++pixel) {
+                const float factor = samples_[pixel] > 0.0f ? 1.0f / samples_[pixel] : 0.0f;
+                std::array<float, 2 * kIdRanks> ranks;
+                write_ranks(&id_slots_[i][pixel * kIdSlots * 2], factor, ranks.data());
+                for (int k = 0; k < 2 * kIdRanks; ++k) layers[k / 4][4 * pixel + k % 4] = ranks[k];
+            }
+        });
+    }
 }
 
 FilmState FilmSums::state() {
     FilmState result;
     for (auto& [name, layer] : film_.layers) result["layer." + name] = layer.pixels;
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) result["ids." + layout_.ids[i].aov] = id_slots_[i];
     result["samples"] = samples_;
     result["subsets"] = subsets_;
     return result;

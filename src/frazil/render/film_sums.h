@@ -48,6 +48,7 @@ class FilmSums {
 
     float* add_layer(const std::string& name, std::size_t channels);
     GroupedLayer add_grouped(const std::string& name);
+    void finish_ids();
     float* utility(const char* name);  // null where the layout does not have it
     void increase_grouped(const GroupedLayer& layer, std::size_t film_pixel, const Rgb* groups);
     static Rgb finish_grouped(const GroupedLayer& layer, std::size_t film_pixel, float factor);
@@ -57,6 +58,8 @@ class FilmSums {
     const FilmLayout& layout_;
     Film film_;
     std::vector<GroupedLayer> components_, planes_;
+    std::vector<std::vector<float>> id_slots_;  // by Cryptomatte: (pixels, kIdSlots, 2)
+    float *uv_, *local_position_, *material_id_, *instance_id_, *point_spacing_, *lacking_;  // null where not asked for
     float *beauty_, *depth_, *object_id_, *normal_, *position_, *coverage_, *albedo_, *sample_count_, *variance_;
     std::vector<float> samples_;  // per pixel; exact up to 2^24
     std::vector<float> subsets_;  // (pixels, kSampleSubsets): sums of the beauty's luminance

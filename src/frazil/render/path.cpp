@@ -77,6 +77,7 @@ struct PathTracer::Path {
     // Who receives light at the last vertex, and by which multipliers lights are chosen there (the camera: everything).
     LightReceiver receiver;
     LightUse use = LightUse::surface;
+    bool has_shown = false;   // what is seen through ice
     bool has_passed = false;  // through something cut out, since the last vertex
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
@@ -203,7 +204,9 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
-            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1});
+            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1,
+                                          surface.st, surface.local_position});
+            tile.add_object(path.pixel, surface.object, false);
             view_axis = nullptr;
         };
         const Body* body = bodies_[surface.object].get();
@@ -238,6 +241,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             }
         }
         note_primary(shader.albedo(wo));
+        if (path.bounce > 0 && path.scattered == 0 && !path.has_shown) {
+            path.has_shown = true;
+            tile.add_object(path.pixel, surface.object, true);
+        }
 
         // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
         const int own_light = lights_.light_of_object(surface.object);
@@ -622,7 +629,12 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
                 tile.add(request.pixel, Component::specular, group, exitance * request.specular);
                 tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
             }
-            if (request.is_primary) tile.add_coverage(request.pixel, coverage);
+            if (request.is_primary) {
+                const Rgb& total = body.total_reflectance;
+                Rgb lacking(0.0f);
+                for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
+                tile.add_coverage(request.pixel, coverage, lacking);
+            }
             if (request.is_primary && layout_.plane_count() > 0) add_planes(request, gathered, i - begin, tile);
         }
         begin = end;

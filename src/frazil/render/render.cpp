@@ -201,7 +201,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
 RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
                              const Checkpoints* checkpoints) {
     RenderStats stats;
-    const FilmLayout layout = make_layout(scene, options.aovs);
+    FilmLayout layout = make_layout(scene, options.aovs);
     const RayScene ray_scene = make_ray_scene(scene, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
@@ -223,6 +223,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     scene.camera.camera_to_world.multDirMatrix(V3f(0.0f, 0.0f, -1.0f), view_axis);
     view_axis.normalize();
 
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i]) layout.point_spacing[i] = bodies[i]->spacing;
+    }
     Canvas canvas(options, layout);
     if (checkpoints && checkpoints->resume_from) canvas.resume(*checkpoints->resume_from);
     CheckpointClock clock(checkpoints);
