@@ -4,6 +4,7 @@ import importlib
 from typing import Any
 
 from ._frazil import (
+    Bake,
     BetterDipole,
     Camera,
     ControlMesh,
@@ -51,14 +52,18 @@ _LAZY = {
     "Recipe": ".grade_recipe",
     "UsdScene": ".usd",
     "grade": ".grading",
+    "bake": ".baking",
+    "load_bake": ".baking",
     "load_usd": ".usd",
     "match": ".matching",
     "poisson_points": ".points",
     "read_meshes": ".usd",
     "render": ".rendering",
+    "save_bake": ".baking",
 }
 
 __all__ = [
+    "Bake",
     "BetterDipole",
     "Camera",
     "ControlMesh",
@@ -93,17 +98,20 @@ __all__ = [
     "TextureLookup",
     "UsdScene",
     "area_compensation",
+    "bake",
     "bake_irradiance",
     "fresnel_average",
     "fresnel_dielectric",
     "grade",
     "light_groups",
+    "load_bake",
     "load_usd",
     "match",
     "point_statistics",
     "poisson_points",
     "read_meshes",
     "render",
+    "save_bake",
     "subdivide",
     "tessellated_points",
     "triangulate",

@@ -7,6 +7,7 @@ Not: changing colours after the render (grading.py).
 
 import json
 import os
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
@@ -84,6 +85,18 @@ class Film:
 
     def __repr__(self) -> str:
         return f"Film({self.width}x{self.height}: {', '.join(self.layers)})"
+
+    def additive_layers(self) -> dict[str, list[str]]:
+        """The layers that sum to the beauty, each with the layers of its light groups, where there are several.
+
+        A group's layers sum to their layer.
+        """
+        table = aov_table()
+        names = [row["name"] for row in table if row["is_additive"] and row["name"] in self.layers]
+        known = {row["name"] for row in table}
+        knots = re.compile(r"translucency_ramp\d+(_.*)?")
+        others = [g for g in self.layers if g not in known and not knots.fullmatch(g)]
+        return {name: [g for g in others if g.startswith(f"{name}_")] for name in names}
 
     def save(
         self,

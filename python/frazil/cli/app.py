@@ -30,6 +30,7 @@ def _frazil(
 
 def app() -> Callable[..., Any]:
     """The command line as a callable that takes ``args``, ``prog_name`` and ``standalone_mode``."""
+    from .bake import bake_command
     from .grade import grade_command
     from .info import info_command
     from .match import match_command
@@ -44,5 +45,6 @@ def app() -> Callable[..., Any]:
         commands.command("points")(points_command)
     commands.command("grade")(grade_command)
     commands.command("match")(match_command)
+    commands.command("bake")(bake_command)
     commands.command("info")(info_command)
     return typer.main.get_command(commands).main

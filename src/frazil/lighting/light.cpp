@@ -13,10 +13,17 @@ void check_size(const Light& light, const char* field, float value) {
                          ". A light without a surface gives no light; enlarge it or remove it."));
 }
 
+// Whether two axes are equal and at right angles, to the precision of floats.
+bool is_round(const V3d& a, const V3d& b) {
+    const double length2 = a.dot(a);
+    return std::abs(b.dot(b) - length2) < 1e-6 * length2 && std::abs(a.dot(b)) < 1e-6 * length2;
+}
+
 // Area of the unit sphere times `radius` moved by the matrix: an ellipsoid. The integral over the unit sphere of
 // |det A| |A^-T n|, by the midpoint rule: exact for a sphere, spectral in azimuth.
 double ellipsoid_area(double radius, const M44f& m) {
     const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    if (is_round(x, y) && is_round(y, z) && is_round(z, x)) return 4.0 * kPiD * radius * radius * x.dot(x);
     const V3d yz = y.cross(z), zx = z.cross(x), xy = x.cross(y);
     constexpr int kPolar = 128, kAzimuths = 128;
     double sum = 0.0;
@@ -34,6 +41,9 @@ double ellipsoid_area(double radius, const M44f& m) {
 double cylinder_area(const CylinderLight& cylinder, const M44f& m) {
     const V3d axis = V3d(m[0][0], m[0][1], m[0][2]) * double(cylinder.length);
     const V3d y = V3d(m[1][0], m[1][1], m[1][2]), z = V3d(m[2][0], m[2][1], m[2][2]);
+    if (is_round(y, z) && std::abs(axis.dot(y)) + std::abs(axis.dot(z)) < 1e-6 * axis.length() * y.length()) {
+        return 2.0 * kPiD * double(cylinder.radius) * axis.length() * y.length();
+    }
     constexpr int kAzimuths = 4096;
     double sum = 0.0;
     for (int j = 0; j < kAzimuths; ++j) {

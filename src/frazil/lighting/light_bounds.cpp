@@ -3,6 +3,8 @@
 namespace frazil {
 namespace {
 
+constexpr float kLeast = 0.1f;  // of what estimates may vanish to, where something may arrive
+
 float safe_sine(float cosine) {
     return std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
 }
@@ -40,6 +42,14 @@ Cone merged(Cone a, Cone b) {
 
 }  // namespace
 
+LightBounds scaled(const LightBounds& bounds, float scale) {
+    LightBounds result = bounds;
+    for (float* part : {&result.power, &result.even, &result.beamed, &result.beam_angle}) *part *= scale;
+    result.flow *= scale;
+    result.beam *= scale;
+    return result;
+}
+
 LightBounds merged(const LightBounds& a, const LightBounds& b) {
     if (a.power == 0.0f) return b;
     if (b.power == 0.0f) return a;
@@ -52,6 +62,12 @@ LightBounds merged(const LightBounds& a, const LightBounds& b) {
     result.cos_spread = std::cos(std::min(kPi, cone.angle + 1e-4f));
     result.cos_emission = std::min(a.cos_emission, b.cos_emission);
     result.power = a.power + b.power;
+    result.center = (a.center * a.power + b.center * b.power) / result.power;
+    result.even = a.even + b.even;
+    result.flow = a.flow + b.flow;
+    result.beamed = a.beamed + b.beamed;
+    result.beam = a.beam + b.beam;
+    result.beam_angle = a.beam_angle + b.beam_angle;
     return result;
 }
 
@@ -65,20 +81,39 @@ float receiving_cosine(const Box3f& box, const V3f& position, const V3f& normal)
 }
 
 float importance(const LightBounds& bounds, const V3f& position, const V3f& normal) {
-    const V3f to_center = (bounds.box.min + bounds.box.max) * 0.5f - position;
-    const float distance2 = to_center.length2(), radius2 = 0.25f * (bounds.box.max - bounds.box.min).length2();
-    const float subtended = cos_subtended(distance2, radius2);
-    float leaving = 1.0f, receiving = 1.0f;
+    const V3f to_box = (bounds.box.min + bounds.box.max) * 0.5f - position;
+    const float box_distance2 = to_box.length2(), radius2 = 0.25f * (bounds.box.max - bounds.box.min).length2();
+    const float subtended = cos_subtended(box_distance2, radius2);
     if (subtended >= 0.0f) {
-        const float inverse = 1.0f / std::sqrt(distance2);
-        // The least angle from a normal at which the receiver can be seen from the box.
-        const float off_axis = -bounds.axis.dot(to_center) * inverse;
-        leaving = cos_difference(cos_difference(off_axis, bounds.cos_spread), subtended);
+        // The least angles at which any light can leave, and be received.
+        const float inverse = 1.0f / std::sqrt(box_distance2);
+        const float off_axis = -bounds.axis.dot(to_box) * inverse;
+        const float leaving = cos_difference(cos_difference(off_axis, bounds.cos_spread), subtended);
         if (leaving < bounds.cos_emission) return 0.0f;
-        if (normal != V3f(0.0f)) receiving = cos_difference(normal.dot(to_center) * inverse, subtended);
-        if (receiving <= 0.0f) return 0.0f;
+        if (normal != V3f(0.0f) && cos_difference(normal.dot(to_box) * inverse, subtended) <= 0.0f) return 0.0f;
     }
-    return bounds.power * std::max(leaving, 1e-3f) * receiving / std::max(std::max(distance2, radius2), 1e-30f);
+
+    // Seen from the middle; what is near, or mixed, is kept from vanishing.
+    const V3f to_light = bounds.center - position;
+    const float distance2 = std::max(to_light.length2(), 1e-30f), distance = std::sqrt(distance2);
+    const V3f away = to_light * (-1.0f / distance);
+    const float size = std::min(1.0f, std::sqrt(radius2 / distance2));
+    float leaving = bounds.even;
+    if (bounds.flow != V3f(0.0f)) {
+        leaving += std::max(bounds.flow.dot(away), kLeast * (bounds.power - bounds.even - bounds.beamed));
+    }
+    if (bounds.beamed > 0.0f) {
+        const float length = std::min(bounds.beam.length() / bounds.beamed, 1.0f);
+        const float cosine = bounds.beam.dot(away) / (bounds.beamed * std::max(length, 1e-6f));
+        const float off_axis = std::acos(std::clamp(cosine, -1.0f, 1.0f));
+        // Axes differ by so much; a share of them points this way.
+        const float spread = std::sqrt(2.0f * (1.0f - length)) + size + 1e-3f;
+        const float share = (bounds.beam_angle / bounds.beamed + spread - off_axis) / (2.0f * spread);
+        leaving += bounds.beamed * std::clamp(share, kLeast, 1.0f);
+    }
+    float receiving = 1.0f;
+    if (normal != V3f(0.0f)) receiving = std::max(-normal.dot(away), kLeast + 0.25f * size);
+    return leaving * receiving / std::max(distance2, 0.5f * radius2);
 }
 
 float tree_cost(const LightBounds& bounds) {

@@ -81,9 +81,7 @@ int LightPicker::build(std::span<PickEntry> entries, std::uint32_t link, int dep
     nodes_.emplace_back();
     nodes_[std::size_t(index)].link = link;
     const auto bounds_of = [&](const PickEntry& entry) {
-        LightBounds bounds = lights_[std::size_t(entry.light)].bounds();
-        bounds.power *= entry.scale;
-        return bounds;
+        return scaled(lights_[std::size_t(entry.light)].bounds(), entry.scale);
     };
     if (entries.size() == 1) {
         Node& leaf = nodes_[std::size_t(index)];

@@ -69,13 +69,17 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
     world_ = world;
 }
 
-LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, LightUse use) const {
+LightPick LightSampler::pick(const LightReceiver& receiver, float u, LightUse use) const {
     thread_local LightPicker::Weights weights;
     picker(use).weigh(receiver, weights);
-    const LightPick pick = picker(use).pick(receiver, weights, u_pick);
-    if (pick.light < 0) return {};
-    LightSample sample = sample_one(pick.light, receiver.position, u);
-    sample.pdf *= pick.probability;
+    return picker(use).pick(receiver, weights, u);
+}
+
+LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, LightUse use) const {
+    const LightPick picked = pick(receiver, u_pick, use);
+    if (picked.light < 0) return {};
+    LightSample sample = sample_one(picked.light, receiver.position, u);
+    sample.pdf *= picked.probability;
     return sample;
 }
 

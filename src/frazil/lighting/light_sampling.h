@@ -32,6 +32,8 @@ class LightSampler {
     const std::vector<Light>& lights() const { return lights_; }
     const WorldLight& world_light(int light) const { return world().lights[std::size_t(light)]; }
 
+    // One light for the receiver, without a direction.
+    LightPick pick(const LightReceiver& receiver, float u, LightUse use = LightUse::surface) const;
     // One direction for the receiver; `u_pick` chooses the light, `u` the direction.
     LightSample sample(const LightReceiver& receiver, float u_pick, const V2f& u,
                        LightUse use = LightUse::surface) const;

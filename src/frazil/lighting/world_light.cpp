@@ -142,12 +142,20 @@ WorldLight::WorldLight(const Light& light) {
     }
     if (const MeshEmitter* mesh = std::get_if<MeshEmitter>(&shape_)) brightness_ *= mesh->brightness();
     bounds_.power = brightness_ * extent_.projected_area;
+    bounds_.center = (bounds_.box.min + bounds_.box.max) * 0.5f;
     if (is_shaped_ && shaping_.has_cone() && shaping_.cone_angle < 90.0f) {
         // No light leaves farther from the axis than the cone's angle, whatever the normal.
         const float angle = shaping_.cone_angle * (kPi / 180.0f) + 0.01f;
         bounds_.axis = axis_;
         bounds_.cos_spread = std::cos(angle);
         bounds_.cos_emission = 1.0f - 1e-4f;
+        bounds_.beamed = bounds_.power;
+        bounds_.beam = axis_ * bounds_.power;
+        bounds_.beam_angle = bounds_.power * angle;
+    } else if (extent_.normal != V3f(0.0f)) {
+        bounds_.flow = extent_.normal * bounds_.power;
+    } else {
+        bounds_.even = bounds_.power;
     }
     if (const Dome* dome = std::get_if<Dome>(&shape_); dome && dome->image) {
         brightness_ = absolute(radiance_ * dome->image->average());
@@ -212,8 +220,7 @@ float WorldLight::importance(const V3f& position) const {
     const float d = std::max(distance, radius);
     if (is_shaped_ && distance > radius) {
         // As seen from the light's middle; what a part of the light may send beyond the cone from there is a bound's.
-        const LightBounds unit{bounds_.box, bounds_.axis, bounds_.cos_spread, bounds_.cos_emission, 1.0f};
-        if (frazil::importance(unit, position, V3f(0.0f)) == 0.0f) return 0.0f;
+        if (frazil::importance(bounds_, position, V3f(0.0f)) == 0.0f) return 0.0f;
         facing *= std::max(luminance(shaped(to_light / distance)), 0.02f);
     }
     return brightness_ * (extent_.projected_area / d) * (facing / d);

@@ -74,11 +74,11 @@ struct PathTracer::Path {
     // of the camera leaves.
     Scattering last;
     bool is_delta = false;  // lights could not be chosen at the last vertex
-    // Who receives light at the last vertex, and by which multipliers lights are chosen there (the camera: everything).
+    // Who receives light at the last vertex (the camera: everything), and which multipliers weigh in the choice there.
     LightReceiver receiver;
     LightUse use = LightUse::surface;
     bool has_shown = false;   // what is seen through ice
-    bool has_passed = false;  // through something cut out, since the last vertex
+    bool has_passed = false;  // through a surface without a lobe, since then
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
     bool has_direct_light = false;
@@ -126,12 +126,15 @@ struct PathTracer::Path {
         has_direct_light = false;
     }
 
-    // `side` is the normal on the side that the path leaves for.
-    void leave_from(const Surface& surface, const V3f& side, const V3f& direction, LightUse light_use) {
+    // `side` is that of the surface which receives.
+    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
         receiver = {surface.position, side, surface.object};
-        use = light_use;
+        use = wanted;
         has_passed = false;
-        ray.origin = offset_origin(surface.position, side);
+    }
+
+    void leave_from(const V3f& position, const V3f& side, const V3f& direction) {
+        ray.origin = offset_origin(position, side);
         ray.direction = direction;
         ray.t_min = 0.0f;
         ray.t_max = std::numeric_limits<float>::infinity();
@@ -169,9 +172,9 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     Path path;
     path.pixel = pixel;
     path.ray = camera_ray;
+    path.receiver.position = camera_ray.origin;
     path.sampler = sampler;
     path.last.refraction = Rgb(1.0f);
-    path.receiver.position = camera_ray.origin;
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
@@ -291,6 +294,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         if (!(value.pdf > 0.0f)) return;
         value.scale(Rgb(1.0f / (value.pdf * reflection_odds)));
         path.scatter(value);
+        path.receive(surface, surface.geometric_normal, LightUse::surface);
         ++path.scattered;
         path.is_delta = false;
         path.has_direct_light = true;
@@ -305,7 +309,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
                 return;
             }
         }
-        path.leave_from(surface, surface.geometric_normal, wi, LightUse::surface);
+        path.leave_from(surface.position, surface.geometric_normal, wi);
         if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
             path.core = core_at(surface, filled);
             path.clear = 1.0f;
@@ -333,31 +337,30 @@ void PathTracer::deliver(const Path& path, Component primary, const Scattering& 
 void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const {
     thread_local std::vector<LightHit> hits;
     hits.clear();
-    const V3f& direction = path.ray.direction;
     const float t_max = surface ? surface->t : std::numeric_limits<float>::infinity();
-    lights_.intersect(path.receiver, path.ray.origin, direction, t_max, hits, path.use);
-    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle, direction,
-                                                     t_max, mesh, path.use)) {
+    lights_.intersect(path.receiver, path.ray.origin, path.ray.direction, t_max, hits, path.use);
+    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle,
+                                                     path.ray.direction, t_max, mesh, path.use)) {
         hits.push_back(mesh);
     }
     for (LightHit& hit : hits) {
         const Light& light = lights_.lights()[std::size_t(hit.light)];
-        const std::size_t group = group_of_light_[std::size_t(hit.light)];
         const bool is_mesh = std::holds_alternative<MeshLight>(light.shape);
+        const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
             if (t_max < hit.distance) continue;
-            if (std::holds_alternative<DomeLight>(light.shape)) {
-                deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
-            } else if (is_mesh && !lights_.is_material(hit.light)) {
+            if (is_mesh && !lights_.is_material(hit.light)) {
                 deliver(path, Component::emission, path.weights(), group, hit.radiance, tile);
+            } else if (std::holds_alternative<DomeLight>(light.shape)) {
+                deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
             }
             continue;
         }
         // Lights whose shadows are not plain may shine through what the ray has met: they are asked once, from the vertex.
         if (!lights_.has_plain_shadow(hit.light) && !is_mesh) {
-            if (path.has_passed) continue;
-            const Ray shadow{path.ray.origin, direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
-            hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
+            if (path.inside.is_empty() ? path.has_passed : t_max < hit.distance) continue;
+            const Ray shadow{path.ray.origin, path.ray.direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
+            if (path.inside.is_empty()) hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
         }
         const float mis = path.is_delta ? 1.0f : path.last.pdf / (path.last.pdf + hit.pdf);
         const Scattering weights =
@@ -365,12 +368,6 @@ void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& t
                          multiplier(light, LightComponent::refraction));
         deliver(path, Component::background, weights, group, hit.radiance * path.light_share * mis, tile);
     }
-}
-
-Rgb PathTracer::arriving(const Ray& shadow, int light, InsideOf inside, Tile& tile, bool& is_straight) const {
-    if (lights_.has_plain_shadow(light)) return interiors_.visibility(shadow, inside, tile.rays, true, &is_straight);
-    ++tile.rays;
-    return shadow_factor(ray_scene_, lights_, light, shadow);
 }
 
 void PathTracer::add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
@@ -391,7 +388,7 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     bool is_straight = true;
-    const Rgb visible = arriving(shadow, sample.light, path.inside, tile, is_straight);
+    const Rgb visible = visibility(sample.light, shadow, path.inside, tile, is_straight);
     if (visible == Rgb(0.0f)) return;
     // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight) specular_lobe = Rgb(0.0f);
@@ -409,6 +406,16 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
     tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
     tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
+}
+
+// What is left of a light along a ray; `is_straight` becomes false where a boundary would bend it. Inside ice shadows are
+// plain.
+Rgb PathTracer::visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const {
+    if (lights_.has_plain_shadow(light) || !inside.is_empty()) {
+        return interiors_.visibility(ray, inside, tile.rays, true, &is_straight);
+    }
+    ++tile.rays;
+    return shadow_factor(ray_scene_, lights_, light, ray);
 }
 
 // ---- ice ------------------------------------------------------------------------------------------------------------
@@ -438,14 +445,15 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     } else {
         path.pass_boundary();
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.is_delta = true;
     }
     path.inside = crossing.beyond;
     path.core = core;
     path.clear = ice.refraction;
     path.volume = ice.volume;
-    path.leave_from(surface, -surface.geometric_normal,
-                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f), LightUse::refraction);
+    path.leave_from(surface.position, -surface.geometric_normal,
+                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     return true;
 }
 
@@ -503,18 +511,20 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
     if (sample.is_reflection) {
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.has_direct_light = false;
         path.light_share = Rgb(1.0f);
         path.is_delta = true;
-        path.leave_from(surface, surface.geometric_normal,
-                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f), LightUse::refraction);
+        path.leave_from(surface.position, surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
     } else {
         path.pass_boundary();
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)});
+        path.receive(surface, -surface.geometric_normal, LightUse::refraction);
         path.is_delta = crossing.to != InsideOf::kNone;
         path.inside = crossing.beyond;
-        path.leave_from(surface, -surface.geometric_normal,
-                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f), LightUse::refraction);
+        path.leave_from(surface.position, -surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     }
     const int body = interiors_.filling(path.inside);
     if (body != InsideOf::kNone) {
@@ -544,7 +554,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
-    const Rgb visible = arriving(shadow, sample.light, crossing.beyond, tile, is_straight);
+    const Rgb visible = visibility(sample.light, shadow, crossing.beyond, tile, is_straight);
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];

@@ -50,10 +50,9 @@ class PathTracer {
     void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,
                  Tile& tile) const;
     void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
-    // What a shadow ray towards a light leaves of it; `is_straight` turns false where it went through a boundary.
-    Rgb arriving(const Ray& shadow, int light, InsideOf inside, Tile& tile, bool& is_straight) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
+    Rgb visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const;
     void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,
                           Sampler& sampler, Tile& tile) const;
 
