@@ -310,6 +310,74 @@ class BetterDipole:
     @property
     def medium(self) -> Medium: ...
 
+class NormalizedDiffusion:
+    """The fit of Christensen and Burley 2015, single scattering included."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+class PhotonBeamDiffusion:
+    """Photon beam diffusion of Habel et al. 2013, multiple scattering alone."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+class MultipleScattering:
+    """
+    The curve of photon beam diffusion, scaled to the exact albedo of light that is
+    scattered more than once.
+    """
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+def half_space_albedo(alpha: float, eta: float = 1.0) -> tuple[float, float]:
+    """
+    What leaves a half space lit from all around, over what enters: (by one scattering, by more), exactly.
+    """
+
 class Ramp:
     """
     A colour for every distance between where light enters and where it leaves.
@@ -354,7 +422,7 @@ class PointTree:
     ----------
     points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).
     irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.
-    profile : Dipole.
+    profile : Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or MultipleScattering.
     ramp : Ramp, optional.
 
     Safe to gather from by many threads at once.

@@ -25,7 +25,7 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool 
             if (!(total > 0.0 && f > 0.0)) continue;
             const double step = 0.01 * (r + z0);
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
-            const double bend = 1.5 / std::hypot(r, mean_free_path(profile, c)) + decay;
+            const double bend = 1.5 / std::hypot(r, bend_length(profile, c)) + decay;
             const double share = std::min(1.0, 6.0 * (r * r + z0 * z0) * f / (total * darkness));
             const double cubed =
                 std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
