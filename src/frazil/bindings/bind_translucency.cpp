@@ -107,9 +107,8 @@ CompensationMode mode_named(const std::string& name) {
 }
 
 template <class Kind>
-void bind_profile(nb::module_& module, const char* name, const char* doc) {
-    nb::class_<Kind>(module, name, doc)
-        .def(nb::init<const Medium&>(), "medium"_a)
+nb::class_<Kind> bind_profile(nb::module_& module, const char* name, const char* doc) {
+    return nb::class_<Kind>(module, name, doc)
         .def(
             "reflectance",
             [](const Kind& self, nb::handle r) {
@@ -183,15 +182,28 @@ void bind_translucency(nb::module_& module) {
                        "), sigma_a=(", m.sigma_a.x, ", ", m.sigma_a.y, ", ", m.sigma_a.z, "), eta=", m.eta, ")");
         });
 
-    bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.");
-    bind_profile<BetterDipole>(module, "BetterDipole", "The better dipole of d'Eon 2012.");
+    bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.")
+        .def(nb::init<const Medium&>(), "medium"_a);
+    bind_profile<BetterDipole>(module, "BetterDipole", "The better dipole of d'Eon 2012.")
+        .def(nb::init<const Medium&>(), "medium"_a);
     bind_profile<NormalizedDiffusion>(module, "NormalizedDiffusion",
-                                      "The fit of Christensen and Burley 2015, single scattering included.");
+                                      "The fit of Christensen and Burley 2015, single scattering included.")
+        .def(nb::init<const Medium&>(), "medium"_a);
     bind_profile<PhotonBeamDiffusion>(module, "PhotonBeamDiffusion",
-                                      "Photon beam diffusion of Habel et al. 2013, multiple scattering alone.");
+                                      "Photon beam diffusion of Habel et al. 2013, multiple scattering alone.")
+        .def(nb::init<const Medium&>(), "medium"_a);
     bind_profile<MultipleScattering>(module, "MultipleScattering",
                                      "The curve of photon beam diffusion, scaled to the exact albedo of light that is\n"
-                                     "scattered more than once.");
+                                     "scattered more than once, and of `single` (0..1) of the light scattered once.")
+        .def(
+            "__init__",
+            [](MultipleScattering* self, const Medium& medium, double single) {
+                if (!(single >= 0.0 && single <= 1.0)) {
+                    throw ValueError(str("MultipleScattering: single must be in [0, 1], got ", single, "."));
+                }
+                new (self) MultipleScattering(medium, single);
+            },
+            "medium"_a, "single"_a = 0.0);
     module.def(
         "half_space_albedo",
         [](double alpha, double eta) {

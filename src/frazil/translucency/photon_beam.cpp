@@ -16,6 +16,8 @@ constexpr int kNodes = 256;
 constexpr double kNearest = 1e-4, kFarthest = 1e4, kDark = 1e-14;
 // Where the table of a gather begins to bend, in mean free paths: kappa leaves a logarithm at r = 0.
 constexpr double kBend = 0.036;
+// Of MultipleScattering, in mean free paths; what comes nearest to the walks of bench/profiles.py.
+constexpr double kSoftening = 0.15;
 
 // The integral over the beam's depth, by panels that double from below the distance r to where the beam is spent.
 class BeamIntegral {
@@ -125,26 +127,40 @@ PhotonBeamDiffusion::PhotonBeamDiffusion(const Medium& made_of) : medium(made_of
 }
 
 double PhotonBeamDiffusion::reflectance(int c, double r) const {
-    return scale_[c] * sigma_t_[c] * sigma_t_[c] * curve_[c]->reflectance(sigma_t_[c] * r);
+    return sigma_t_[c] * sigma_t_[c] * curve_[c]->reflectance(sigma_t_[c] * r);
 }
 
 double PhotonBeamDiffusion::within(int c, double radius) const {
-    return std::isinf(radius) ? albedo(c) : scale_[c] * curve_[c]->within(sigma_t_[c] * radius);
+    return std::isinf(radius) ? albedo(c) : curve_[c]->within(sigma_t_[c] * radius);
 }
 
 double PhotonBeamDiffusion::albedo(int c) const {
-    return scale_[c] * curve_[c]->total();
+    return curve_[c]->total();
 }
 
 double PhotonBeamDiffusion::bend_length(int c) const {
     return kBend / sigma_t_[c];
 }
 
-MultipleScattering::MultipleScattering(const Medium& made_of) : PhotonBeamDiffusion(made_of) {
+MultipleScattering::MultipleScattering(const Medium& made_of, double single) : medium(made_of), curve_(made_of) {
     for (int c = 0; c < 3; ++c) {
-        const double alpha = medium.sigma_s_prime[c] / sigma_t_[c], total = curve_[c]->total();
-        scale_[c] = total > 0.0 ? half_space_albedo(alpha, medium.eta).multiple / total : 0.0;
+        const double scatter = medium.sigma_s_prime[c], total = scatter + medium.sigma_a[c];
+        const HalfSpaceAlbedo exact = half_space_albedo(scatter / total, medium.eta);
+        albedo_[c] = exact.multiple + single * exact.single;
+        softening_[c] = kSoftening / total;
+        before_[c] = curve_.within(c, softening_[c]);
+        const double beyond = curve_.albedo(c) - before_[c];
+        scale_[c] = beyond > 0.0 ? albedo_[c] / beyond : 0.0;
     }
+}
+
+double MultipleScattering::reflectance(int c, double r) const {
+    return scale_[c] * curve_.reflectance(c, std::hypot(r, softening_[c]));
+}
+
+double MultipleScattering::within(int c, double radius) const {
+    if (std::isinf(radius)) return albedo_[c];
+    return scale_[c] * (curve_.within(c, std::hypot(radius, softening_[c])) - before_[c]);
 }
 
 }  // namespace frazil

@@ -1,5 +1,6 @@
 #include "frazil/translucency/profile.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -37,7 +38,7 @@ std::string name_of(ProfileKind kind) {
     return "";
 }
 
-Profile make_profile(ProfileKind kind, const Medium& medium) {
+Profile make_profile(ProfileKind kind, const Medium& medium, double single) {
     switch (kind) {
         case ProfileKind::dipole:
             return Dipole(medium);
@@ -50,7 +51,7 @@ Profile make_profile(ProfileKind kind, const Medium& medium) {
         case ProfileKind::multiple_scattering:
             break;
     }
-    return MultipleScattering(medium);
+    return MultipleScattering(medium, single);
 }
 
 bool lacks_single_scattering(ProfileKind kind) {
@@ -87,6 +88,15 @@ const Medium& medium(const Profile& profile) {
 
 double bend_length(const Profile& profile, int channel) {
     return std::visit([&](const auto& p) { return p.bend_length(channel); }, profile);
+}
+
+double mean_free_path(const Profile& profile, int channel) {
+    const Medium& m = medium(profile);
+    return 1.0 / (double(m.sigma_s_prime[channel]) + m.sigma_a[channel]);
+}
+
+double shortest_mean_free_path(const Profile& profile) {
+    return std::min({mean_free_path(profile, 0), mean_free_path(profile, 1), mean_free_path(profile, 2)});
 }
 
 }  // namespace frazil

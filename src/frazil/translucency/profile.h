@@ -25,8 +25,9 @@ enum class ProfileKind { dipole, better_dipole, normalized_diffusion, photon_bea
 // ValueError beginning with `path` for a name that is none of the above.
 ProfileKind profile_named(const std::string& name, const std::string& path);
 std::string name_of(ProfileKind kind);
-Profile make_profile(ProfileKind kind, const Medium& medium);
-// Whether light of one scattering has to be added.
+// `single`: how much of the light of one scattering MultipleScattering is to stand for too, 0..1.
+Profile make_profile(ProfileKind kind, const Medium& medium, double single = 0.0);
+// Whether the profile leaves light of one scattering to other means.
 bool lacks_single_scattering(ProfileKind kind);
 
 // Rd(r): exitance per unit of area and of irradiance times area that enters at distance r.
@@ -45,5 +46,8 @@ double albedo(const Profile& profile, int channel);
 const Medium& medium(const Profile& profile);
 // The distance below which the profile is nearly flat: a transport mean free path for dipoles, less for others.
 double bend_length(const Profile& profile, int channel);
+// The transport mean free path, 1/(sigma_s' + sigma_a), and the shortest of the three.
+double mean_free_path(const Profile& profile, int channel);
+double shortest_mean_free_path(const Profile& profile);
 
 }  // namespace frazil
