@@ -8,6 +8,8 @@ namespace {
 // Calibrated on a bunny and a sphere (bench/gather.py): how a tolerance becomes a size, and by how much the size may
 // grow where little of the profile's energy is left.
 constexpr double kSizePerTolerance = 500.0, kSharePower = 0.7, kLargestCubed = 7.0, kRampCaution = 0.4;
+// How far from r = 0 a profile is as steep as it ever is, over the length of its bend; at most a mean free path.
+constexpr double kLengthPerBend = 1.7;
 // A cluster is never seen from nearer than its radius over this.
 constexpr double kWidest = 0.6;
 
@@ -25,7 +27,8 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool 
             if (!(total > 0.0 && f > 0.0)) continue;
             const double step = 0.01 * (r + shortest);
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
-            const double bend = 1.5 / std::hypot(r, mean_free_path(profile, c)) + decay;
+            const double length = std::min(mean_free_path(profile, c), kLengthPerBend * bend_length(profile, c));
+            const double bend = 1.5 / std::hypot(r, length) + decay;
             const double share = std::min(1.0, 6.0 * (r * r + shortest * shortest) * f / (total * darkness));
             const double cubed =
                 std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
