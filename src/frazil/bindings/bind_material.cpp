@@ -19,11 +19,9 @@ using FloatInput = std::variant<TextureLookup, float>;
 
 constexpr std::pair<Wrap, const char*> kWrapNames[] = {
     {Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}, {Wrap::mirror, "mirror"}, {Wrap::black, "black"}};
-constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {{CompensationMode::off, "off"},
-                                                                           {CompensationMode::ratio, "ratio"},
-                                                                           {CompensationMode::conserve, "conserve"},
-                                                                           {CompensationMode::fill, "fill"},
-                                                                           {CompensationMode::linear, "linear"}};
+constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {
+    {CompensationMode::off, "off"},     {CompensationMode::ratio, "ratio"}, {CompensationMode::conserve, "conserve"},
+    {CompensationMode::depth, "depth"}, {CompensationMode::fill, "fill"},   {CompensationMode::linear, "linear"}};
 
 template <class Enum, std::size_t N>
 Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {

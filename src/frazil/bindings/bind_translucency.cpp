@@ -101,9 +101,11 @@ CompensationMode mode_named(const std::string& name) {
     if (name == "off") return CompensationMode::off;
     if (name == "ratio") return CompensationMode::ratio;
     if (name == "conserve") return CompensationMode::conserve;
+    if (name == "depth") return CompensationMode::depth;
     if (name == "fill") return CompensationMode::fill;
     if (name == "linear") return CompensationMode::linear;
-    throw ValueError(str("area_compensation: mode must be off, ratio, conserve, fill or linear, got '", name, "'."));
+    throw ValueError(
+        str("area_compensation: mode must be off, ratio, conserve, depth, fill or linear, got '", name, "'."));
 }
 
 template <class Kind>

@@ -24,6 +24,9 @@ struct Body {
     Profile profile;
     Rgb total_reflectance = Rgb(0.0f);      // Rd_total
     std::unique_ptr<const PointTree> tree;  // none where the object has no surface
+    // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
+    // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
+    Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
 
     // What the boundary lets in (and out) at this angle; its mean over all directions; for one user roughness.
     float transmittance(float cos_theta, float roughness) const;
@@ -41,11 +44,22 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
+// The tree of a body's points. Where the compensation asks for the thickness of parts, their gain (thickness.h) rides along
+// as one light group more.
+PointTree make_tree(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
+                    const std::vector<Rgb>& thickness_gains);
+// That gain at each point; empty where the compensation has no use for it.
+std::vector<Rgb> thickness_gains(const Body& body, const PointSet& points, const RayScene& ray_scene);
+
+// What leaves at some positions, compensated: exitance (M, groups) and coverage, from a tree that make_tree made.
+Gathered compensated_exitance(const Body& body, const PointTree& tree, const V3f* positions, std::size_t count,
+                              const GatherOptions& options);
+
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each. Fills points, nodes and seconds of the stats.
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats);
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -572,7 +572,7 @@ void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& s
     request.entering = core.entering;
     request.entering_group = core.entering_group;
     Scattering weights = path.weights();
-    weights.scale(core.radiance_per_exitance * share);
+    weights.scale(core.radiance_per_exitance * share * body.core_scale);
     request.diffuse = weights.diffuse;
     request.specular = weights.specular;
     (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
@@ -609,17 +609,16 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
         for (; end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object; ++end) {
             positions.push_back(tile.requests[end].position);
         }
-        const Gathered gathered = body.tree->gather(positions.data(), positions.size(), options);
+        const Gathered gathered = compensated_exitance(body, *body.tree, positions.data(), positions.size(), options);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
             tile.subset = request.subset;
             const Rgb& coverage = gathered.coverage[i - begin];
             const Compensation& compensation = body.material->compensation;
-            const Rgb gain = compensation_gain(compensation, coverage, body.total_reflectance);
             const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
             for (std::size_t group = 0; group < gathered.groups; ++group) {
-                Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
+                Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group];
                 if (group == request.entering_group) exitance += fill;
                 tile.add(request.pixel, Component::translucency, group, exitance * request.translucency);
                 tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
