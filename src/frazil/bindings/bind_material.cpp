@@ -219,7 +219,7 @@ void bind_ice(nb::module_& module) {
         "ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.\n"
         "ramp_preserve_energy : keep the total reflectance whatever the ramp.\n"
         "profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.\n"
-        "compensation : 'off', 'ratio', 'conserve', 'fill' or 'linear'; compensation_limit >= 1;\n"
+        "compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;\n"
         "    compensation_strength in [0, 1].\n"
         "spacing : of the points, metres; 0 = from the mean free path.\n\n"
         "Ranges are checked when the scene is rendered.");
@@ -252,7 +252,7 @@ void bind_ice(nb::module_& module) {
         "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
         "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(), "volume"_a = 0.0f, "anisotropy"_a = 0.0f,
         "priority"_a = 0, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
-        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "ratio",
+        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
         "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);

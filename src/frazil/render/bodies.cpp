@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "frazil/render/interior.h"
 #include "frazil/render/stopwatch.h"
@@ -9,6 +10,12 @@
 #include "frazil/translucency/half_space.h"
 
 namespace frazil {
+namespace {
+
+// Thickness varies slowly: its gathers may be this much coarser.
+constexpr float kThicknessTolerance = 4.0f;
+
+}  // namespace
 
 float Body::transmittance(float cos_theta, float roughness) const {
     return 1.0f - material->specular * boundary->eval(cos_theta, alpha_from_roughness(roughness));
@@ -31,6 +38,8 @@ Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     std::vector<std::unique_ptr<Body>> bodies(scene.objects.size());
     std::map<float, std::shared_ptr<const DielectricAlbedo>> boundaries;  // by eta
+    std::map<std::pair<const IceMaterial*, bool>, std::optional<Profile>> profiles;
+    std::map<std::uint32_t, bool> closed;  // by mesh, of those that it matters for
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const auto* material = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
         if (!material) continue;
@@ -38,10 +47,16 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         if (!boundary) boundary = std::make_shared<DielectricAlbedo>(material->medium.eta);
         // What rays trace of the light that is scattered once, the profile leaves out.
         const Medium& medium = material->medium;
-        const bool is_traced = material->volume > 0.0f && is_closed(scene.meshes[scene.objects[i].mesh]);
+        bool is_traced = material->volume > 0.0f;
+        if (is_traced) {
+            const auto [found, is_new] = closed.try_emplace(scene.objects[i].mesh, false);
+            if (is_new) found->second = is_closed(scene.meshes[scene.objects[i].mesh]);
+            is_traced = found->second;
+        }
         const double traced = is_traced ? material->volume : 0.0;
-        const Profile profile = make_profile(material->profile, medium, 1.0 - traced);
-        bodies[i] = std::make_unique<Body>(Body{material, boundary, profile, albedo(profile), nullptr});
+        auto& profile = profiles[{material, is_traced}];
+        if (!profile) profile = make_profile(material->profile, medium, 1.0 - traced);
+        bodies[i] = std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr});
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
@@ -53,44 +68,34 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     return bodies;
 }
 
-std::vector<Rgb> thickness_gains(const Body& body, const PointSet& points, const RayScene& ray_scene) {
-    if (body.material->compensation.mode != CompensationMode::depth) return {};
-    return thickness_gain(points, ray_scene, body.material->medium, body.traced_once);
+std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
+                                                     const RayScene& ray_scene) {
+    if (body.material->compensation.mode != CompensationMode::depth || points.size() == 0) return nullptr;
+    return std::make_unique<const PointTree>(
+        points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once), 1, body.profile);
 }
 
-PointTree make_tree(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
-                    const std::vector<Rgb>& thickness_gains) {
-    if (thickness_gains.empty()) return {points, irradiance, groups, body.profile, body.material->ramp};
-    std::vector<Rgb> values((groups + 1) * points.size(), Rgb(0.0f));
-    for (std::size_t k = 0; k < points.size(); ++k) {
-        std::copy_n(&irradiance[k * groups], groups, &values[k * (groups + 1)]);
-        values[k * (groups + 1) + groups] = thickness_gains[k];
-    }
-    return {points, std::move(values), groups + 1, body.profile, body.material->ramp};
-}
-
-Gathered compensated_exitance(const Body& body, const PointTree& tree, const V3f* positions, std::size_t count,
-                              const GatherOptions& options) {
-    Gathered gathered = tree.gather(positions, count, options);
-    const Compensation& compensation = body.material->compensation;
-    const bool has_thickness = compensation.mode == CompensationMode::depth;
-    const std::size_t all = gathered.groups, groups = all - has_thickness;
+std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+                                 const GatherOptions& options) {
+    if (!thickness) return {};
+    const Gathered sums =
+        thickness->gather(positions, count, {kThicknessTolerance * options.tolerance, Estimator::sum, false});
+    std::vector<Rgb> gains(count, Rgb(1.0f));
     for (std::size_t i = 0; i < count; ++i) {
-        const Rgb& coverage = gathered.coverage[i];
-        Rgb gain = compensation_gain(compensation, coverage, body.total_reflectance);
-        if (has_thickness) {
-            const Rgb& sum = gathered.exitance[i * all + groups];
-            for (int c = 0; c < 3; ++c) {
-                if (!(coverage[c] > 0.0f)) continue;
-                gain[c] *= 1.0f + compensation.strength * (std::max(sum[c] / coverage[c], 1.0f) - 1.0f);
-            }
+        for (int c = 0; c < 3; ++c) {
+            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
         }
-        for (std::size_t g = 0; g < groups; ++g)
-            gathered.exitance[i * groups + g] = gathered.exitance[i * all + g] * gain;
     }
-    gathered.groups = groups;
-    gathered.exitance.resize(count * groups);
-    return gathered;
+    return gains;
+}
+
+void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
+    const Compensation& compensation = body.material->compensation;
+    for (std::size_t i = 0; i < gathered.coverage.size(); ++i) {
+        Rgb gain = compensation_gain(compensation, gathered.coverage[i], body.total_reflectance);
+        if (!gains.empty()) gain *= Rgb(1.0f) + (gains[i] - Rgb(1.0f)) * compensation.strength;
+        for (std::size_t g = 0; g < gathered.groups; ++g) gathered.exitance[i * gathered.groups + g] *= gain;
+    }
 }
 
 void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
@@ -99,8 +104,9 @@ void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const Ra
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
         const Body& body = *bodies[i];
-        bodies[i]->tree = std::make_unique<const PointTree>(
-            make_tree(body, lit[i].points, lit[i].irradiance, groups, thickness_gains(body, lit[i].points, ray_scene)));
+        bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
+                                                            body.material->ramp);
+        bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();
     }

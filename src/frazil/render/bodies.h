@@ -22,8 +22,9 @@ struct Body {
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
-    Rgb total_reflectance = Rgb(0.0f);      // Rd_total
-    std::unique_ptr<const PointTree> tree;  // none where the object has no surface
+    Rgb total_reflectance = Rgb(0.0f);           // Rd_total
+    std::unique_ptr<const PointTree> tree;       // none where the object has no surface
+    std::unique_ptr<const PointTree> thickness;  // make_thickness_tree
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
@@ -44,16 +45,14 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
-// The tree of a body's points. Where the compensation asks for the thickness of parts, their gain (thickness.h) rides along
-// as one light group more.
-PointTree make_tree(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
-                    const std::vector<Rgb>& thickness_gains);
-// That gain at each point; empty where the compensation has no use for it.
-std::vector<Rgb> thickness_gains(const Body& body, const PointSet& points, const RayScene& ray_scene);
-
-// What leaves at some positions, compensated: exitance (M, groups) and coverage, from a tree that make_tree made.
-Gathered compensated_exitance(const Body& body, const PointTree& tree, const V3f* positions, std::size_t count,
-                              const GatherOptions& options);
+// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where the compensation has no use for it.
+std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
+                                                     const RayScene& ray_scene);
+// The mean gain around each position, from such a tree; empty without one.
+std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+                                 const GatherOptions& options);
+// Scale the exitance that was gathered as the body's material asks for; `gains` as above.
+void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
 
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);

@@ -609,7 +609,8 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
         for (; end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object; ++end) {
             positions.push_back(tile.requests[end].position);
         }
-        const Gathered gathered = compensated_exitance(body, *body.tree, positions.data(), positions.size(), options);
+        Gathered gathered = body.tree->gather(positions.data(), positions.size(), options);
+        compensate(body, thickness_gains(body.thickness.get(), positions.data(), positions.size(), options), gathered);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];

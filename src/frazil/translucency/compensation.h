@@ -20,7 +20,7 @@ enum class CompensationMode {
 };
 
 struct Compensation {
-    CompensationMode mode = CompensationMode::ratio;
+    CompensationMode mode = CompensationMode::depth;
     float limit = 8.0f;         // largest gain, >= 1
     float strength = 1.0f;      // 0 = off, 1 = full
     bool by_luminance = false;  // one factor for all channels, from luminances
