@@ -64,11 +64,12 @@ def main() -> None:
     parser.add_argument("--groups", type=int, nargs="+", default=[1, 8])
     parser.add_argument("--tolerance", type=float, nargs="+", default=[0.01])
     parser.add_argument("--estimator", nargs="+", default=["sum", "noise_free"])
+    parser.add_argument("--profile", default="Dipole", help="Dipole, MultipleScattering, ... (default Dipole)")
     parser.add_argument("--check", type=int, default=100)
     options = parser.parse_args()
 
     mesh = trimesh.load(options.mesh, force="mesh")
-    profile = fz.Dipole(fz.Medium(sigma_s_prime=30.0, sigma_a=(0.6, 0.15, 0.05), eta=1.0))
+    profile = getattr(fz, options.profile)(fz.Medium(sigma_s_prime=30.0, sigma_a=(0.6, 0.15, 0.05), eta=1.0))
     shading = Points(mesh, options.shading, seed=2).positions
     checked = slice(None, None, max(1, len(shading) // options.check))
     for count in options.points:

@@ -310,6 +310,74 @@ class BetterDipole:
     @property
     def medium(self) -> Medium: ...
 
+class NormalizedDiffusion:
+    """The fit of Christensen and Burley 2015, single scattering included."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+class PhotonBeamDiffusion:
+    """Photon beam diffusion of Habel et al. 2013, multiple scattering alone."""
+
+    def __init__(self, medium: Medium) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+class MultipleScattering:
+    """
+    The curve of photon beam diffusion, scaled to the exact albedo of light that is
+    scattered more than once, and of `single` (0..1) of the light scattered once.
+    """
+
+    def __init__(self, medium: Medium, single: float = 0.0) -> None: ...
+
+    def reflectance(self, r: object) -> object:
+        """Rd(r) in 1/m², (n, 3), for distances r (n,) in metres."""
+
+    def within(self, R: object) -> object:
+        """
+        F(R): the fraction that leaves within R metres of where it entered, (n, 3); inf gives the albedo.
+        """
+
+    @property
+    def albedo(self) -> object:
+        """Total diffuse reflectance Rd_total = F(inf), (3,)."""
+
+    @property
+    def medium(self) -> Medium: ...
+
+def half_space_albedo(alpha: float, eta: float = 1.0) -> tuple[float, float]:
+    """
+    What leaves a half space lit from all around, over what enters: (by one scattering, by more), exactly.
+    """
+
 class Ramp:
     """
     A colour for every distance between where light enters and where it leaves.
@@ -354,7 +422,7 @@ class PointTree:
     ----------
     points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).
     irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.
-    profile : Dipole.
+    profile : Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or MultipleScattering.
     ramp : Ramp, optional.
 
     Safe to gather from by many threads at once.
@@ -905,14 +973,15 @@ class IceMaterial:
     tint : RGB factor on what leaves the core, or a TextureLookup.
     ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.
     ramp_preserve_energy : keep the total reflectance whatever the ramp.
-    compensation : 'off', 'ratio', 'conserve', 'fill' or 'linear'; compensation_limit >= 1;
+    profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.
+    compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;
         compensation_strength in [0, 1].
     spacing : of the points, metres; 0 = from the mean free path.
 
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'ratio', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -988,6 +1057,12 @@ class IceMaterial:
 
     @property
     def ramp_preserve_energy(self) -> bool: ...
+
+    @property
+    def profile(self) -> str: ...
+
+    @profile.setter
+    def profile(self, arg: str, /) -> None: ...
 
     @property
     def compensation(self) -> str: ...

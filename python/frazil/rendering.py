@@ -47,7 +47,7 @@ def render(
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
     bake_samples: int = 64,
-    bake_bounces: int = 1,
+    bake_bounces: int = 4,
     tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",

@@ -45,51 +45,6 @@ def test_dipole_equals_its_formula():
         np.testing.assert_allclose(fz.Dipole(medium).reflectance(r), dipole_numpy(medium, np.float32(r)), rtol=2e-5)
 
 
-@pytest.mark.parametrize("kind", [fz.Dipole, fz.BetterDipole])
-@pytest.mark.parametrize("medium", [MEDIUM, MATCHED])
-def test_profiles_integrate_to_their_albedo(medium, kind):
-    profile = kind(medium)
-    for c in range(3):
-        total = integrate.quad(
-            lambda x, c=c: 2 * np.pi * np.exp(2 * x) * float(profile.reflectance(np.exp(x))[0, c]), -14, 3, limit=400
-        )[0]
-        assert total == pytest.approx(profile.albedo[c], rel=1e-4)
-    np.testing.assert_allclose(profile.within(np.inf)[0], profile.albedo, rtol=1e-6)
-    part = integrate.quad(lambda r: 2 * np.pi * r * float(profile.reflectance(r)[0, 0]), 0, 0.1)[0]
-    assert part == pytest.approx(profile.within(0.1)[0, 0], rel=1e-4)
-
-
-@pytest.mark.parametrize("kind", [fz.Dipole, fz.BetterDipole])
-def test_nothing_absorbed_means_albedo_one(kind):
-    np.testing.assert_allclose(kind(CLEAR).albedo, 1.0, rtol=1e-6)
-
-
-def reflectance_of_a_walk(alpha: float, count: int = 60000, seed: int = 1) -> tuple[float, float]:
-    """What leaves an index-matched isotropic half space lit straight down: by more than one scattering, and in all."""
-    rng = np.random.default_rng(seed)
-    depth, weight = rng.exponential(size=count), np.full(count, alpha)
-    single, multiple, order = 0.0, 0.0, 1
-    while depth.size and weight.max() > 1e-5:
-        depth = depth - rng.uniform(-1, 1, depth.size) * rng.exponential(size=depth.size)
-        out = depth < 0
-        if order == 1:
-            single = weight[out].sum()
-        else:
-            multiple += weight[out].sum()
-        depth, weight = depth[~out], weight[~out] * alpha
-        order += 1
-    return multiple / count, (single + multiple) / count
-
-
-@pytest.mark.parametrize("alpha", [0.5, 0.8, 0.9, 0.95, 0.99])
-def test_albedo_against_a_random_walk(alpha):
-    """The standard dipole's total is that of all orders but for 0.04; the better dipole lies between them."""
-    medium = fz.Medium(alpha, 1.0 - alpha, eta=1.0)
-    multiple, everything = reflectance_of_a_walk(alpha)
-    assert abs(fz.Dipole(medium).albedo[0] - everything) < 0.04
-    assert multiple < fz.BetterDipole(medium).albedo[0] < everything
-
-
 def test_same_bits_alone_and_among_threads():
     """Two gathers of one set agree to the bit, whatever the threads do; a shuffled set may differ by the tolerance."""
     points = sphere(20000)

@@ -136,7 +136,7 @@ def test_ice_for_the_frazil_context_wins_over_the_universal_surface(stage):
         ("roughness", FLOAT, 2.0, 1.0, r"/Material/Surface: roughness must be in 0..1, got 2. 1 is used."),
         ("roughness", FLOAT, float("nan"), 0.1, "roughness must be finite"),
         ("compensation_limit", FLOAT, 0.0, 1.0, "compensation_limit must be >= 1, got 0"),
-        ("compensation", TOKEN, "much", "ratio", "compensation must be one of off, ratio"),
+        ("compensation", TOKEN, "much", "depth", "compensation must be one of off, ratio"),
         ("roughness", Sdf.ValueTypeNames.String, "rough", 0.1, "roughness must be a float, got 'rough'"),
     ],
 )

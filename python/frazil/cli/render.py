@@ -74,7 +74,7 @@ def render_command(
     bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
-    ] = 1,
+    ] = 4,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[

@@ -145,6 +145,7 @@ class MaterialReader:
                     "priority",
                     "tint",
                     "ramp_preserve_energy",
+                    "profile",
                     "compensation",
                     "compensation_limit",
                     "compensation_strength",

@@ -19,11 +19,9 @@ using FloatInput = std::variant<TextureLookup, float>;
 
 constexpr std::pair<Wrap, const char*> kWrapNames[] = {
     {Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}, {Wrap::mirror, "mirror"}, {Wrap::black, "black"}};
-constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {{CompensationMode::off, "off"},
-                                                                           {CompensationMode::ratio, "ratio"},
-                                                                           {CompensationMode::conserve, "conserve"},
-                                                                           {CompensationMode::fill, "fill"},
-                                                                           {CompensationMode::linear, "linear"}};
+constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {
+    {CompensationMode::off, "off"},     {CompensationMode::ratio, "ratio"}, {CompensationMode::conserve, "conserve"},
+    {CompensationMode::depth, "depth"}, {CompensationMode::fill, "fill"},   {CompensationMode::linear, "linear"}};
 
 template <class Enum, std::size_t N>
 Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {
@@ -220,13 +218,14 @@ void bind_ice(nb::module_& module) {
         "tint : RGB factor on what leaves the core, or a TextureLookup.\n"
         "ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.\n"
         "ramp_preserve_energy : keep the total reflectance whatever the ramp.\n"
-        "compensation : 'off', 'ratio', 'conserve', 'fill' or 'linear'; compensation_limit >= 1;\n"
+        "profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.\n"
+        "compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;\n"
         "    compensation_strength in [0, 1].\n"
         "spacing : of the points, metres; 0 = from the mean free path.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
-        [](IceMaterial* self, const Medium& medium, const FloatInput& roughness, float specular, float translucency,
+        [](IceMaterial* self, const Medium& medium, const std::string& profile, const FloatInput& roughness, float specular, float translucency,
            float refraction, const std::optional<float>& refraction_roughness, float volume, float anisotropy,
            int priority, const ColorInput& tint, const std::vector<float>& ramp_distances,
            const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy, const std::string& compensation,
@@ -247,12 +246,13 @@ void bind_ice(nb::module_& module) {
             model.compensation = {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
                                   compensation_limit, compensation_strength};
             model.spacing = spacing;
+            model.profile = profile_named(profile, "IceMaterial");
             new (self) IceMaterial(std::move(model));
         },
-        "medium"_a, nb::kw_only(), "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
+        "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
         "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(), "volume"_a = 0.0f, "anisotropy"_a = 0.0f,
         "priority"_a = 0, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
-        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "ratio",
+        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
         "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);
@@ -281,6 +281,9 @@ void bind_ice(nb::module_& module) {
                          return colors;
                      })
         .def_prop_ro("ramp_preserve_energy", [](const IceMaterial& model) { return model.ramp.preserve_energy; })
+        .def_prop_rw(
+            "profile", [](const IceMaterial& model) { return name_of(model.profile); },
+            [](IceMaterial& model, const std::string& name) { model.profile = profile_named(name, "IceMaterial"); })
         .def_prop_rw(
             "compensation",
             [](const IceMaterial& model) { return to_name(kCompensationNames, model.compensation.mode); },

@@ -1,9 +1,12 @@
+#include <nanobind/stl/pair.h>
+
 #include <cmath>
 #include <functional>
 
 #include "frazil/bindings/bindings.h"
 #include "frazil/translucency/compensation.h"
 #include "frazil/translucency/fresnel.h"
+#include "frazil/translucency/half_space.h"
 #include "frazil/translucency/point_tree.h"
 
 namespace frazil {
@@ -98,15 +101,16 @@ CompensationMode mode_named(const std::string& name) {
     if (name == "off") return CompensationMode::off;
     if (name == "ratio") return CompensationMode::ratio;
     if (name == "conserve") return CompensationMode::conserve;
+    if (name == "depth") return CompensationMode::depth;
     if (name == "fill") return CompensationMode::fill;
     if (name == "linear") return CompensationMode::linear;
-    throw ValueError(str("area_compensation: mode must be off, ratio, conserve, fill or linear, got '", name, "'."));
+    throw ValueError(
+        str("area_compensation: mode must be off, ratio, conserve, depth, fill or linear, got '", name, "'."));
 }
 
 template <class Kind>
-void bind_profile(nb::module_& module, const char* name, const char* doc) {
-    nb::class_<Kind>(module, name, doc)
-        .def(nb::init<const Medium&>(), "medium"_a)
+nb::class_<Kind> bind_profile(nb::module_& module, const char* name, const char* doc) {
+    return nb::class_<Kind>(module, name, doc)
         .def(
             "reflectance",
             [](const Kind& self, nb::handle r) {
@@ -130,7 +134,11 @@ void bind_profile(nb::module_& module, const char* name, const char* doc) {
 Profile to_profile(nb::handle object) {
     if (nb::isinstance<Dipole>(object)) return nb::cast<const Dipole&>(object);
     if (nb::isinstance<BetterDipole>(object)) return nb::cast<const BetterDipole&>(object);
-    throw ValueError(str("profile must be a Dipole or BetterDipole, got ", nb::repr(object.type()).c_str(), "."));
+    if (nb::isinstance<NormalizedDiffusion>(object)) return nb::cast<const NormalizedDiffusion&>(object);
+    if (nb::isinstance<PhotonBeamDiffusion>(object)) return nb::cast<const PhotonBeamDiffusion&>(object);
+    if (nb::isinstance<MultipleScattering>(object)) return nb::cast<const MultipleScattering&>(object);
+    throw ValueError(str("profile must be a Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or ",
+                         "MultipleScattering, got ", nb::repr(object.type()).c_str(), "."));
 }
 
 }  // namespace
@@ -176,8 +184,42 @@ void bind_translucency(nb::module_& module) {
                        "), sigma_a=(", m.sigma_a.x, ", ", m.sigma_a.y, ", ", m.sigma_a.z, "), eta=", m.eta, ")");
         });
 
-    bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.");
-    bind_profile<BetterDipole>(module, "BetterDipole", "The better dipole of d'Eon 2012.");
+    bind_profile<Dipole>(module, "Dipole", "The standard dipole of Jensen et al. 2001.")
+        .def(nb::init<const Medium&>(), "medium"_a);
+    bind_profile<BetterDipole>(module, "BetterDipole", "The better dipole of d'Eon 2012.")
+        .def(nb::init<const Medium&>(), "medium"_a);
+    bind_profile<NormalizedDiffusion>(module, "NormalizedDiffusion",
+                                      "The fit of Christensen and Burley 2015, single scattering included.")
+        .def(nb::init<const Medium&>(), "medium"_a);
+    bind_profile<PhotonBeamDiffusion>(module, "PhotonBeamDiffusion",
+                                      "Photon beam diffusion of Habel et al. 2013, multiple scattering alone.")
+        .def(nb::init<const Medium&>(), "medium"_a);
+    bind_profile<MultipleScattering>(module, "MultipleScattering",
+                                     "The curve of photon beam diffusion, scaled to the exact albedo of light that is\n"
+                                     "scattered more than once, and of `single` (0..1) of the light scattered once.")
+        .def(
+            "__init__",
+            [](MultipleScattering* self, const Medium& medium, double single) {
+                if (!(single >= 0.0 && single <= 1.0)) {
+                    throw ValueError(str("MultipleScattering: single must be in [0, 1], got ", single, "."));
+                }
+                new (self) MultipleScattering(medium, single);
+            },
+            "medium"_a, "single"_a = 0.0);
+    module.def(
+        "half_space_albedo",
+        [](double alpha, double eta) {
+            if (!(alpha >= 0.0 && alpha <= 1.0)) {
+                throw ValueError(str("half_space_albedo: alpha must be in [0, 1], got ", alpha, "."));
+            }
+            if (!(eta >= 1.0 && eta <= 4.0)) {
+                throw ValueError(str("half_space_albedo: eta must be in [1, 4], got ", eta, "."));
+            }
+            const HalfSpaceAlbedo albedo = half_space_albedo(alpha, eta);
+            return std::pair{albedo.single, albedo.multiple};
+        },
+        "alpha"_a, "eta"_a = 1.0,
+        "What leaves a half space lit from all around, over what enters: (by one scattering, by more), exactly.");
 
     nb::class_<Ramp>(module, "Ramp",
                      "A colour for every distance between where light enters and where it leaves.\n\n"
@@ -225,14 +267,15 @@ void bind_translucency(nb::module_& module) {
             return view(reinterpret_cast<float*>(self.coverage.data()), {self.coverage.size(), 3}, nb::find(self));
         });
 
-    nb::class_<PointTree>(module, "PointTree",
-                          "The octree of points with their irradiance.\n\n"
-                          "Parameters\n----------\n"
-                          "points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).\n"
-                          "irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.\n"
-                          "profile : Dipole.\n"
-                          "ramp : Ramp, optional.\n\n"
-                          "Safe to gather from by many threads at once.")
+    nb::class_<PointTree>(
+        module, "PointTree",
+        "The octree of points with their irradiance.\n\n"
+        "Parameters\n----------\n"
+        "points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).\n"
+        "irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.\n"
+        "profile : Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or MultipleScattering.\n"
+        "ramp : Ramp, optional.\n\n"
+        "Safe to gather from by many threads at once.")
         .def(
             "__init__",
             [](PointTree* self, nb::handle points, nb::handle irradiance, nb::handle profile, const Ramp* ramp) {

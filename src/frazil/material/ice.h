@@ -9,12 +9,14 @@
 #include "frazil/material/texture.h"
 #include "frazil/translucency/compensation.h"
 #include "frazil/translucency/medium.h"
+#include "frazil/translucency/profile.h"
 #include "frazil/translucency/ramp.h"
 
 namespace frazil {
 
 struct IceMaterial {
     Medium medium;
+    ProfileKind profile = ProfileKind::multiple_scattering;
     MaterialInput<float> roughness{0.1f, {}};
     float specular = 1.0f;                   // weight of the reflection, 0..1
     float translucency = 1.0f;               // weight of the core, 0..1

@@ -1,10 +1,21 @@
 #include "frazil/render/bodies.h"
 
+#include <algorithm>
 #include <map>
+#include <optional>
 
+#include "frazil/render/interior.h"
 #include "frazil/render/stopwatch.h"
+#include "frazil/render/thickness.h"
+#include "frazil/translucency/half_space.h"
 
 namespace frazil {
+namespace {
+
+// Thickness varies slowly: its gathers may be this much coarser.
+constexpr float kThicknessTolerance = 4.0f;
+
+}  // namespace
 
 float Body::transmittance(float cos_theta, float roughness) const {
     return 1.0f - material->specular * boundary->eval(cos_theta, alpha_from_roughness(roughness));
@@ -27,24 +38,79 @@ Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     std::vector<std::unique_ptr<Body>> bodies(scene.objects.size());
     std::map<float, std::shared_ptr<const DielectricAlbedo>> boundaries;  // by eta
+    std::map<std::pair<const IceMaterial*, bool>, std::optional<Profile>> profiles;
+    std::map<std::uint32_t, bool> closed;  // by mesh, of those that it matters for
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const auto* material = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
         if (!material) continue;
         auto& boundary = boundaries[material->medium.eta];
         if (!boundary) boundary = std::make_shared<DielectricAlbedo>(material->medium.eta);
-        const Profile profile = Dipole(material->medium);
-        bodies[i] = std::make_unique<Body>(Body{material, boundary, profile, albedo(profile), nullptr});
+        // What rays trace of the light that is scattered once, the profile leaves out.
+        const Medium& medium = material->medium;
+        bool is_traced = material->volume > 0.0f;
+        if (is_traced) {
+            const auto [found, is_new] = closed.try_emplace(scene.objects[i].mesh, false);
+            if (is_new) found->second = is_closed(scene.meshes[scene.objects[i].mesh]);
+            is_traced = found->second;
+        }
+        const double traced = is_traced ? material->volume : 0.0;
+        auto& profile = profiles[{material, is_traced}];
+        if (!profile) profile = make_profile(material->profile, medium, 1.0 - traced);
+        bodies[i] = std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr});
+        if (!is_traced || !lacks_single_scattering(material->profile)) continue;
+        const double white = half_space_albedo(1.0, medium.eta).single;
+        bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
+        for (int c = 0; c < 3; ++c) {
+            const double alpha = medium.sigma_s_prime[c] / (double(medium.sigma_s_prime[c]) + medium.sigma_a[c]);
+            bodies[i]->traced_once[c] = static_cast<float>(traced * half_space_albedo(alpha, medium.eta).single);
+        }
     }
     return bodies;
 }
 
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats) {
+std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
+                                                     const RayScene& ray_scene) {
+    if (body.material->compensation.mode != CompensationMode::depth || points.size() == 0) return nullptr;
+    return std::make_unique<const PointTree>(
+        points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once), 1, body.profile);
+}
+
+std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+                                 const GatherOptions& options) {
+    if (!thickness) return {};
+    const Gathered sums =
+        thickness->gather(positions, count, {kThicknessTolerance * options.tolerance, Estimator::sum, false});
+    std::vector<Rgb> gains(count, Rgb(1.0f));
+    for (std::size_t i = 0; i < count; ++i) {
+        for (int c = 0; c < 3; ++c) {
+            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
+        }
+    }
+    return gains;
+}
+
+Rgb Body::gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const {
+    const Rgb area = compensation_gain(compensation, coverage, total_reflectance);
+    return thin ? area * (Rgb(1.0f) + (*thin - Rgb(1.0f)) * compensation.strength) : area;
+}
+
+void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
+    const Compensation& compensation = body.material->compensation;
+    for (std::size_t i = 0; i < gathered.coverage.size(); ++i) {
+        const Rgb gain = body.gain(compensation, gathered.coverage[i], gains.empty() ? nullptr : &gains[i]);
+        for (std::size_t g = 0; g < gathered.groups; ++g) gathered.exitance[i * gathered.groups + g] *= gain;
+    }
+}
+
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
-        bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups,
-                                                            bodies[i]->profile, bodies[i]->material->ramp);
+        const Body& body = *bodies[i];
+        bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
+                                                            body.material->ramp);
+        bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
         bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();

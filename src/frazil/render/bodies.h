@@ -22,9 +22,16 @@ struct Body {
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
-    Rgb total_reflectance = Rgb(0.0f);      // Rd_total
-    std::unique_ptr<const PointTree> tree;  // none where the object has no surface
-    float spacing = 0.0f;                   // of its points
+    Rgb total_reflectance = Rgb(0.0f);           // Rd_total
+    std::unique_ptr<const PointTree> tree;       // none where the object has no surface
+    std::unique_ptr<const PointTree> thickness;  // make_thickness_tree
+    // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
+    // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
+    Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
+    float spacing = 0.0f;  // of its points
+
+    // What exitance is scaled by where W is `coverage`; `thin` is one of thickness_gains(), null without.
+    Rgb gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const;
 
     // What the boundary lets in (and out) at this angle; its mean over all directions; for one user roughness.
     float transmittance(float cos_theta, float roughness) const;
@@ -42,11 +49,20 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
+// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where the compensation has no use for it.
+std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
+                                                     const RayScene& ray_scene);
+// The mean gain around each position, from such a tree; empty without one.
+std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+                                 const GatherOptions& options);
+// Scale the exitance that was gathered as the body's material asks for; `gains` as above.
+void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
+
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each. Fills points, nodes and seconds of the stats.
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats);
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -20,13 +20,12 @@ struct Exitance {
 };
 
 Exitance exitance_of(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
-                     const GatherOptions& options) {
+                     const std::vector<Rgb>& gains, const GatherOptions& options) {
     const PointTree tree(points, irradiance, groups, body.profile, body.material->ramp);
     Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
-    for (std::size_t k = 0; k < points.size(); ++k) {
-        const Rgb gain = compensation_gain(body.material->compensation, gathered.coverage[k], body.total_reflectance);
-        for (std::size_t g = 0; g < groups; ++g) gathered.exitance[k * groups + g] *= gain;
-    }
+    compensate(body, gains, gathered);
+    // Light of one scattering that camera rays trace leaves here as from a plane.
+    for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
     return {std::move(gathered.exitance), std::make_unique<const PointLookup>(points)};
 }
 
@@ -69,13 +68,20 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         ray_scene, lights, [&](const BounceHit& hit) { return diffuse_albedo(resolver, hit); },
         kShadowRaysPerReflection, options.seed);
 
-    std::vector<std::vector<Rgb>> last(lit.size());  // what the last bounce brought
-    for (std::size_t i = 0; i < lit.size(); ++i) last[i] = lit[i].irradiance;
+    std::vector<std::vector<Rgb>> last(lit.size());   // what the last bounce brought
+    std::vector<std::vector<Rgb>> gains(lit.size());  // of thin parts
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+        last[i] = lit[i].irradiance;
+        if (!bodies[i]) continue;
+        const PointSet& points = lit[i].points;
+        const auto thickness = make_thickness_tree(*bodies[i], points, ray_scene);
+        gains[i] = thickness_gains(thickness.get(), points.positions.data(), points.size(), options.gather);
+    }
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exitance> exitance(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;
-            exitance[i] = exitance_of(*bodies[i], lit[i].points, last[i], groups, options.gather);
+            exitance[i] = exitance_of(*bodies[i], lit[i].points, last[i], groups, gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;

@@ -142,7 +142,8 @@ float FilmSums::variance_of_mean(std::size_t film_pixel) const {
     std::array<float, kSampleSubsets> means;
     float mean = 0.0f, squares = 0.0f;
     for (int subset = 0; subset < kSampleSubsets; ++subset) {
-        const int own = samples / kRound * kSubsetRun + std::clamp(samples % kRound - subset * kSubsetRun, 0, kSubsetRun);
+        const int own =
+            samples / kRound * kSubsetRun + std::clamp(samples % kRound - subset * kSubsetRun, 0, kSubsetRun);
         means[subset] = subsets_[film_pixel * kSampleSubsets + subset] / static_cast<float>(own);
         mean += means[subset] / kSampleSubsets;
     }

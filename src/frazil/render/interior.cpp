@@ -72,7 +72,15 @@ Enclosure enclosure(const Mesh& mesh) {
     return result;
 }
 
+bool is_closed(const Enclosure& shape) {
+    return shape.rim * shape.rim <= kLargestHole * 4.0 * double(kPi) * shape.area && shape.volume != 0.0;
+}
+
 }  // namespace
+
+bool is_closed(const Mesh& mesh) {
+    return is_closed(enclosure(mesh));
+}
 
 bool InsideOf::leave(int object) {
     for (int i = size_ - 1; i >= 0; --i) {
@@ -103,7 +111,7 @@ Interiors::Interiors(const Scene& scene, const RayScene& ray_scene, const Surfac
         auto [found, is_new] = of_mesh.try_emplace(mesh);
         if (is_new) found->second = enclosure(scene.meshes[mesh]);
         const Enclosure& shape = found->second;
-        if (shape.rim * shape.rim > kLargestHole * 4.0 * double(kPi) * shape.area || shape.volume == 0.0) {
+        if (!is_closed(shape)) {
             warnings_.push_back(str(scene.objects[i].path,
                                     ": the mesh must be closed to be seen into, got open edges of ", shape.rim,
                                     " units. It is rendered without refraction and volume; close its holes, "

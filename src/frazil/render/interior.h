@@ -18,6 +18,9 @@
 
 namespace frazil {
 
+// Whether rays can tell inside from outside: the mesh is closed, but for small holes.
+bool is_closed(const Mesh& mesh);
+
 // The bodies that a place is inside of, in the order in which they were entered.
 class InsideOf {
   public:

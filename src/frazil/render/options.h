@@ -24,7 +24,7 @@ struct RenderOptions {
     float spacing = 0.0f;        // of all points, metres; 0 = by material
     float spacing_scale = 1.0f;  // multiplies every spacing
     int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
-    int bake_bounces = 1;        // of light that reaches the points by way of ice and diffuse surfaces
+    int bake_bounces = 4;        // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
     std::vector<std::string> aovs;  // of the table, beside those that are made anyway
 };

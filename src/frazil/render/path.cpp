@@ -580,7 +580,7 @@ void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& s
     request.entering = core.entering;
     request.entering_group = core.entering_group;
     Scattering weights = path.weights();
-    weights.scale(core.radiance_per_exitance * share);
+    weights.scale(core.radiance_per_exitance * share * body.core_scale);
     request.diffuse = weights.diffuse;
     request.specular = weights.specular;
     (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
@@ -623,13 +623,16 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
         const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
+        const std::vector<Rgb> thin =
+            thickness_gains(body.thickness.get(), positions.data(), positions.size(), with_layers);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
             tile.subset = request.subset;
             const Rgb& coverage = gathered.coverage[i - begin];
             const Compensation& compensation = body.material->compensation;
-            const Rgb gain = compensation_gain(compensation, coverage, body.total_reflectance);
+            const Rgb* thin_gain = thin.empty() ? nullptr : &thin[i - begin];
+            const Rgb gain = body.gain(compensation, coverage, thin_gain);
             const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
             for (std::size_t group = 0; group < gathered.groups; ++group) {
                 Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
@@ -645,7 +648,8 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
                 tile.add_coverage(request.pixel, coverage, lacking);
             }
-            if (request.is_primary && layout_.plane_count() > 0) add_planes(request, gathered, i - begin, tile);
+            if (request.is_primary && layout_.plane_count() > 0)
+                add_planes(request, gathered, i - begin, thin_gain, tile);
         }
         begin = end;
     }
@@ -653,7 +657,8 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
 }
 
 // Translucency once more, apart by ramp knot and as every compensation mode that was asked for would have it.
-void PathTracer::add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, Tile& tile) const {
+void PathTracer::add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row,
+                            const Rgb* thin_gain, Tile& tile) const {
     const Body& body = *bodies_[request.object];
     const Compensation& rendered = body.material->compensation;
     const Rgb &coverage = gathered.coverage[row], &weight = request.translucency;
@@ -661,7 +666,7 @@ void PathTracer::add_planes(const GatherRequest& request, const Gathered& gather
         return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
     };
     if (!layout_.knots.empty()) {
-        const Rgb scale = compensation_gain(rendered, coverage, body.total_reflectance) * weight;
+        const Rgb scale = body.gain(rendered, coverage, thin_gain) * weight;
         const std::size_t first = layout_.first_knot[scene_.objects[request.object].material];
         for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
             const Rgb* light = gathered.knots > 0 ? &gathered.layers[(row * gathered.knots + k) * gathered.groups]
@@ -679,7 +684,7 @@ void PathTracer::add_planes(const GatherRequest& request, const Gathered& gather
         full.mode = layout_.modes[m];
         full.strength = 1.0f;
         const std::size_t plane = layout_.knots.size() + m;
-        const Rgb scale = compensation_gain(full, coverage, body.total_reflectance) * weight;
+        const Rgb scale = body.gain(full, coverage, full.mode == rendered.mode ? thin_gain : nullptr) * weight;
         for (std::size_t g = 0; g < gathered.groups; ++g) {
             tile.add_to_plane(request.pixel, plane, g, gathered.exitance[row * gathered.groups + g] * scale);
         }

@@ -65,7 +65,8 @@ class PathTracer {
                        Tile& tile) const;
     void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
     void add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const;
-    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, Tile& tile) const;
+    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, const Rgb* thin_gain,
+                    Tile& tile) const;
 
     const Scene& scene_;
     const RayScene& ray_scene_;

@@ -17,6 +17,7 @@ struct BetterDipole {
     double reflectance(int channel, double r) const;
     double within(int channel, double radius) const;
     double albedo(int channel) const;
+    double bend_length(int channel) const { return 0.7 * channel_[channel].z_r; }
 
   private:
     struct Channel {

@@ -43,6 +43,7 @@ Rgb compensation_gain(const Compensation& compensation, const Rgb& coverage, con
                 if (lacking > 0.0f) gain[c] = 1.0f / std::max(covered[c], 1.0f / compensation.limit);
                 break;
             case CompensationMode::conserve:
+            case CompensationMode::depth:
                 gain[c] = 1.0f / std::max(covered[c], 1.0f / compensation.limit);
                 break;
             case CompensationMode::linear:

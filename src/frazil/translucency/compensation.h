@@ -14,12 +14,13 @@ enum class CompensationMode {
     off,       // M
     ratio,     // M / (1 - factor) where factor > 0, capped: only brightens
     conserve,  // M Rd_total / W in both directions, capped: keeps energy when light bounces
+    depth,     // as conserve, towards what a part as thin as here returns, where that is known (render/thickness.h)
     fill,      // M + factor Rd_total E(x) where factor > 0
     linear,    // M (1 + factor) where factor > 0
 };
 
 struct Compensation {
-    CompensationMode mode = CompensationMode::ratio;
+    CompensationMode mode = CompensationMode::depth;
     float limit = 8.0f;         // largest gain, >= 1
     float strength = 1.0f;      // 0 = off, 1 = full
     bool by_luminance = false;  // one factor for all channels, from luminances

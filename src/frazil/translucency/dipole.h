@@ -18,6 +18,7 @@ struct Dipole {
     double reflectance(int channel, double r) const;
     double within(int channel, double radius) const;
     double albedo(int channel) const;
+    double bend_length(int channel) const { return 0.7 * z_r[channel]; }
 };
 
 // A: how much the boundary throws back, 1 for eta = 1.

@@ -203,7 +203,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     const RampHinges ramp = hinges_of(tree.ramp, tree.ramp_scale);
     std::vector<RampHinges> hats;
     for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(tree.ramp, k), Rgb(1.0f)));
-    const float widest = kWidestBlock / std::sqrt(tree.table.inverse_z0_squared);
+    const auto widest = static_cast<float>(kWidestBlock * shortest_mean_free_path(tree.profile));
     parallel_for(order.size(), 8 * kBlockLanes, [&](std::size_t chunk_begin, std::size_t chunk_end) {
         Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free, {}, {}};
         BlockSums block;

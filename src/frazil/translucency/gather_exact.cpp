@@ -34,8 +34,7 @@ Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estima
     out.groups = tree.groups;
     out.exitance.assign(count * tree.groups, Rgb(0.0f));
     out.coverage.assign(count, Rgb(0.0f));
-    double shortest = mean_free_path(tree.profile, 0);
-    for (int c = 1; c < 3; ++c) shortest = std::min(shortest, mean_free_path(tree.profile, c));
+    const double shortest = shortest_mean_free_path(tree.profile);
     parallel_for(count, 16, [&](std::size_t begin, std::size_t end) {
         std::vector<double> sums(3 * tree.groups);
         for (std::size_t i = begin; i < end; ++i) {

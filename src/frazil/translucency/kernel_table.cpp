@@ -9,21 +9,34 @@ namespace {
 
 constexpr int kN = KernelTable::kCoefficients;
 
-// The power-basis polynomial in t - 1/2 for t in [0, 1] through f at the Chebyshev nodes.
-template <class Function>
-std::array<double, kN> fit(const Function& f) {
-    std::array<double, kN> node, divided;
-    for (int i = 0; i < kN; ++i) {
-        node[i] = -0.5 * std::cos(3.14159265358979323846 * (i + 0.5) / kN);
-        divided[i] = f(node[i] + 0.5);
+// The power-basis polynomial in t - 1/2 for t in [0, 1] that comes nearest to f: weighted least squares over Chebyshev
+// nodes, which is nearly the least greatest error of weight times f.
+template <class Function, class Weight>
+std::array<double, kN> fit(const Function& f, const Weight& weight) {
+    constexpr int kSamples = 40;
+    double matrix[kN][kN + 1] = {};
+    for (int i = 0; i < kSamples; ++i) {
+        const double x = -0.5 * std::cos(3.14159265358979323846 * (i + 0.5) / kSamples);
+        const double w = weight(x + 0.5), value = f(x + 0.5);
+        double power[kN] = {1.0};
+        for (int k = 1; k < kN; ++k) power[k] = power[k - 1] * x;
+        for (int row = 0; row < kN; ++row) {
+            for (int k = 0; k < kN; ++k) matrix[row][k] += w * w * power[row] * power[k];
+            matrix[row][kN] += w * w * power[row] * value;
+        }
     }
-    for (int order = 1; order < kN; ++order) {
-        for (int i = kN - 1; i >= order; --i) divided[i] = (divided[i] - divided[i - 1]) / (node[i] - node[i - order]);
+    // The normal equations are positive definite: eliminate without pivots.
+    for (int i = 0; i < kN; ++i) {
+        for (int row = i + 1; row < kN; ++row) {
+            const double factor = matrix[row][i] / matrix[i][i];
+            for (int k = i; k <= kN; ++k) matrix[row][k] -= factor * matrix[i][k];
+        }
     }
     std::array<double, kN> power{};
     for (int i = kN - 1; i >= 0; --i) {
-        for (int k = kN - 1; k > 0; --k) power[k] = power[k - 1] - node[i] * power[k];
-        power[0] = divided[i] - node[i] * power[0];
+        double value = matrix[i][kN];
+        for (int k = i + 1; k < kN; ++k) value -= matrix[i][k] * power[k];
+        power[i] = value / matrix[i][i];
     }
     return power;
 }
@@ -45,8 +58,8 @@ double reach_of(const Profile& profile, double z0) {
 
 KernelTable tabulate(const Profile& profile) {
     KernelTable table;
-    double z0 = mean_free_path(profile, 0);
-    for (int c = 1; c < 3; ++c) z0 = std::min(z0, mean_free_path(profile, c));
+    double z0 = bend_length(profile, 0);
+    for (int c = 1; c < 3; ++c) z0 = std::min(z0, bend_length(profile, c));
     const double wanted = reach_of(profile, z0);
     const double octaves = std::log2(1.0 + wanted * wanted / (z0 * z0));
     table.split = 2.0 * octaves <= KernelTable::kSegments - 1 ? 1 : 0;
@@ -57,10 +70,11 @@ KernelTable tabulate(const Profile& profile) {
         const double octave = std::ldexp(1.0, s / pieces);
         const double begin = octave * (1.0 + double(s % pieces) / pieces), width = octave / pieces;
         for (int c = 0; c < 3; ++c) {
-            const auto power = fit([&](double t) {
-                const double u = begin + t * width;
-                return reflectance(profile, c, z0 * std::sqrt(std::max(0.0, u - 1.0)));
-            });
+            const auto power = fit(
+                [&](double t) {
+                    return reflectance(profile, c, z0 * std::sqrt(std::max(0.0, begin + t * width - 1.0)));
+                },
+                [&](double t) { return std::sqrt(begin + t * width - 0.97); });  // towards r²: a ring's share of energy
             for (int k = 0; k < kN; ++k) table.coefficient[c][k][s] = static_cast<float>(power[k]);
         }
     }

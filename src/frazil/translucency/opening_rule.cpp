@@ -8,6 +8,8 @@ namespace {
 // Calibrated on a bunny and a sphere (bench/gather.py): how a tolerance becomes a size, and by how much the size may
 // grow where little of the profile's energy is left.
 constexpr double kSizePerTolerance = 500.0, kSharePower = 0.7, kLargestCubed = 7.0, kRampCaution = 0.4;
+// How far from r = 0 a profile is as steep as it ever is, over the length of its bend; at most a mean free path.
+constexpr double kLengthPerBend = 1.7;
 // A cluster is never seen from nearer than its radius over this.
 constexpr double kWidest = 0.6;
 
@@ -16,17 +18,18 @@ constexpr double kWidest = 0.6;
 OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance,
                          double darkness)
     : inverse_z0_squared_(table.inverse_z0_squared) {
-    const double z0 = 1.0 / std::sqrt(double(inverse_z0_squared_));
+    const double z0 = 1.0 / std::sqrt(double(inverse_z0_squared_)), shortest = shortest_mean_free_path(profile);
     for (int i = 0; i < kEntries; ++i) {
         const double u = std::ldexp(1.0 + (i % 4) / 4.0, i / 4), r = z0 * std::sqrt(u - 1.0);
-        double limit = kWidest * (r + z0);
+        double limit = kWidest * (r + shortest);
         for (int c = 0; c < 3; ++c) {
             const double total = albedo(profile, c), f = reflectance(profile, c, r);
             if (!(total > 0.0 && f > 0.0)) continue;
-            const double step = 0.01 * (r + z0);
+            const double step = 0.01 * (r + shortest);
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
-            const double bend = 1.5 / std::hypot(r, mean_free_path(profile, c)) + decay;
-            const double share = std::min(1.0, 6.0 * (r * r + z0 * z0) * f / (total * darkness));
+            const double length = std::min(mean_free_path(profile, c), kLengthPerBend * bend_length(profile, c));
+            const double bend = 1.5 / std::hypot(r, length) + decay;
+            const double share = std::min(1.0, 6.0 * (r * r + shortest * shortest) * f / (total * darkness));
             const double cubed =
                 std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
             limit = std::min(limit, std::cbrt(cubed / std::pow(std::max(share, 1e-12), kSharePower)) / bend);

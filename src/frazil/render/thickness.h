@@ -1,0 +1,23 @@
+// How much more light leaves a thin part of a body than the thick plane that profiles assume: its paths are shorter.
+// Model: where nothing is absorbed, light's paths through a body are 4 V/S long on the mean, however it scatters
+//   [BlancoFournier2003]; at a point the mean chord c to the other side stands for that. Absorbed is
+//   a = (1 - A)(1 - e^{-sigma_a l/(1 - A)}), l = c eta²/T_avg: sigma_a l where it is thin, the half space's 1 - A where
+//   it is thick.
+// Units: metres.
+// Valid: bench/truth.py measures it; 1 where nothing is absorbed.
+// Not: which way the light goes through the part.
+#pragma once
+
+#include <vector>
+
+#include "frazil/geometry/ray_scene.h"
+#include "frazil/points/point_set.h"
+#include "frazil/translucency/medium.h"
+
+namespace frazil {
+
+// (1 - a)/A per point, both less `traced_once`, what rays trace of the light of one scattering (over irradiance).
+std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
+                                const Rgb& traced_once);
+
+}  // namespace frazil
