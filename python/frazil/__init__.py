@@ -18,6 +18,7 @@ from ._frazil import (
     Medium,
     Mesh,
     Object,
+    Overlay,
     PointSet,
     PointStatistics,
     PointTree,
@@ -44,6 +45,7 @@ from .warning import FrazilWarning
 # Names that need more than the core, and where they live: imported when first asked for.
 _LAZY = {
     "Film": ".film",
+    "ice_preset": ".ice",
     "UsdScene": ".usd",
     "load_usd": ".usd",
     "poisson_points": ".points",
@@ -68,6 +70,7 @@ __all__ = [
     "Medium",
     "Mesh",
     "Object",
+    "Overlay",
     "PointSet",
     "PointStatistics",
     "PointTree",
@@ -84,6 +87,7 @@ __all__ = [
     "bake_irradiance",
     "fresnel_average",
     "fresnel_dielectric",
+    "ice_preset",
     "light_groups",
     "load_usd",
     "point_statistics",

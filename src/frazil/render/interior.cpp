@@ -194,7 +194,7 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
             const Body& ice = *bodies_[hit.placement];
             if (is_straight && !is_index_matched(ice.material->medium.eta)) *is_straight = false;
             const float cosine = std::abs(surface.normal.dot(rest.direction));
-            result *= ice.transmittance(cosine, eval_float(ice.material->roughness, surface.st));
+            result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
             // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
             const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
             const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));

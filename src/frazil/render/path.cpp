@@ -20,6 +20,10 @@ constexpr int kMaxTransparentHits = 64;
 constexpr int kMaxInnerBounces = 8, kMaxVolumePieces = 2;
 // A refracted path that is worth less than this goes on by chance only.
 constexpr float kFaint = 0.02f;
+// How much wider an opaque surface makes the cone that a path stands for, per metre.
+constexpr float kScatteredSpread = 0.05f;
+constexpr std::uint32_t kSheetDimensions = 16384;
+constexpr int kMaxSheets = 8;  // looked at on one piece of a path
 
 float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
@@ -39,9 +43,17 @@ V3f on_side(const V3f& direction, const V3f& normal, float sign) {
     return cosine > 0.0f ? direction : (direction - normal * (2.0f * sign * (cosine - 1e-5f))).normalized();
 }
 
-float refraction_alpha(const IceMaterial& ice, const V2f& st) {
-    return alpha_from_roughness(ice.refraction_roughness >= 0.0f ? ice.refraction_roughness
-                                                                 : eval_float(ice.roughness, st));
+// What goes through is blurred at least as the overlays blur the reflection.
+float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
+    const float roughness = surface.covering.roughness;
+    if (ice.refraction_roughness < 0.0f) return alpha_from_roughness(roughness);
+    const float bare = eval_float(ice.roughness, surface.st);
+    return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
+}
+
+// How much wider a lobe makes the cone that a path stands for, per metre.
+float lobe_spread(float alpha) {
+    return 0.5f * alpha;
 }
 
 }  // namespace
@@ -81,6 +93,8 @@ struct PathTracer::Path {
     InsideOf inside;
     Core core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
+    float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
 
     // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
     Scattering weights(float diffuse, float specular, float refraction) const {
@@ -126,6 +140,12 @@ struct PathTracer::Path {
         ray.t_min = 0.0f;
         ray.t_max = std::numeric_limits<float>::infinity();
     }
+    // The next piece of the path begins inside ice at the end of the last.
+    void begin_piece(const Core& from, float volume_weight) {
+        core = from;
+        clear = core_share = 1.0f;
+        volume = volume_weight;
+    }
 
     // Straight on through a surface.
     void pass_through(const Surface& surface, float t) {
@@ -140,7 +160,7 @@ struct PathTracer::Path {
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-                       int max_bounces)
+                       int max_bounces, const PixelCone& pixel)
     : scene_(scene),
       ray_scene_(ray_scene),
       lights_(lights),
@@ -150,7 +170,8 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       interiors_(scene, ray_scene, resolver_, bodies),
       single_scattering_(lights, interiors_, bodies),
       camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
-      max_bounces_(max_bounces) {}
+      max_bounces_(max_bounces),
+      pixel_(pixel) {}
 
 void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                        Tile& tile) const {
@@ -159,6 +180,8 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     path.ray = camera_ray;
     path.sampler = sampler;
     path.last.refraction = Rgb(1.0f);
+    path.width = pixel_.radius;
+    path.spread = pixel_.spread;
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
@@ -180,14 +203,24 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         Hit hit;
         ++tile.rays;
         const bool is_hit = ray_scene_.intersect(path.ray, hit);
-        const float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
+        float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
         path.begin_vertex();
+        V3f sheet_normal;
+        Rgb sheet_color;
+        const bool is_sheet = !path.inside.is_empty() && find_sheet(path, length, length, sheet_normal, sheet_color);
         if (!path.inside.is_empty() && !cross_interior(path, length, path.sampler, tile)) return;
+        if (is_sheet) {
+            path.width += path.spread * length;
+            const V3f position = path.ray.origin + path.ray.direction * length;
+            if (!meet_sheet(path, position, sheet_normal, sheet_color, tile)) return;
+            continue;
+        }
         add_lights_on_ray(path, length, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
-        const Surface surface = resolver_.resolve(hit, path.ray.direction);
+        path.width += path.spread * length;
+        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, true);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
@@ -233,8 +266,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         float reflection_odds = 1.0f;
         if (body) {
-            const float leaving =
-                body->transmittance(surface.normal.dot(wo), eval_float(body->material->roughness, surface.st));
+            const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             Core core = core_at(surface, static_cast<int>(surface.object));
             core.is_primary = path.bounce == 0;
             add_entering_light(core, surface, *body, path.sampler);
@@ -248,7 +280,8 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
                 split = nullptr;
             } else {
                 // Either reflect or enter, by how much goes either way.
-                reflection_odds = std::clamp(1.0f - leaving, 0.05f, 0.95f);
+                reflection_odds =
+                    std::clamp(1.0f - leaving * (1.0f - luminance(surface.covering.reflectance)), 0.05f, 0.95f);
                 if (path.sampler.next_1d() >= reflection_odds) {
                     // The light that comes straight from lights is the reflection's, whichever way the path goes.
                     add_direct_light(path, surface, shader, wo, path.sampler, tile);
@@ -273,6 +306,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         path.is_delta = false;
         path.has_direct_light = true;
         path.light_share = Rgb(1.0f);
+        path.spread += kScatteredSpread;
         split = nullptr;
 
         // Russian roulette on what the path may still bring.
@@ -285,9 +319,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         path.leave_from(surface.position, surface.geometric_normal, wi);
         if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
-            path.core = core_at(surface, filled);
-            path.clear = 1.0f;
-            path.volume = bodies_[std::size_t(filled)]->material->volume;
+            path.begin_piece(core_at(surface, filled), bodies_[std::size_t(filled)]->material->volume);
         }
     }
 }
@@ -382,7 +414,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     const float eta = interiors_.eta(crossing.to);
     const Frame frame(surface.normal);
     const BoundarySample sample =
-        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface.st), eta,
+        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface), eta,
                         interiors_.transmission(static_cast<int>(surface.object)), sampler.next_2d());
     if (!(sample.weight > 0.0f)) return false;
 
@@ -395,9 +427,12 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
         path.is_delta = true;
     }
     path.inside = crossing.beyond;
-    path.core = core;
-    path.clear = ice.refraction;
-    path.volume = ice.volume;
+    // What overlays cover is not seen through; what they scatter the core does not get, so that its share grows.
+    const float bare = 1.0f - surface.covering.covered;
+    path.begin_piece(core, ice.volume * bare);
+    path.clear = ice.refraction * bare;
+    path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
+    path.spread += lobe_spread(refraction_alpha(ice, surface));
     path.leave_from(surface.position, -surface.geometric_normal,
                     on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     return true;
@@ -422,13 +457,97 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
                     scattered.radiance * path.volume, tile);
         }
     }
-    request_gather(path, path.core, Rgb(1.0f) - unscattered - once, tile);
+    request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
     path.last.scale(unscattered * exp(medium.sigma_a * -way));
-    path.clear = 1.0f;
+    path.clear = path.core_share = 1.0f;
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
     return left > 0.0f && path.survives(left / kFaint);
+}
+
+// The first fracture plane inside ice that stops the path: each in turn by the chance of its opacity.
+bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const {
+    const int body = interiors_.filling(path.inside);
+    if (body == InsideOf::kNone) return false;
+    const IceMaterial& ice = *bodies_[std::size_t(body)]->material;
+    if (!ice.has_sheets()) return false;
+    // Nothing is seen through so much ice.
+    const Rgb sigma = ice.medium.sigma_s_prime + ice.medium.sigma_a;
+    const float reach = std::min(length, 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f));
+    const auto object = static_cast<std::uint32_t>(body);
+    const V3f origin = path.ray.origin * resolver_.world_to_rest(object);
+    V3f direction;
+    resolver_.world_to_rest(object).multDirMatrix(path.ray.direction, direction);
+    Sampler coin = path.sampler;
+    coin.set_dimension(kSheetDimensions + 32U * path.vertex);
+    bool is_found = false;
+    for (const Overlay& overlay : ice.overlays) {
+        const float opacity = overlay.internal * age_weight(overlay, ice.age);
+        if (overlay.pattern.kind != PatternKind::fracture || !(opacity > 0.0f)) continue;
+        float begin = 0.5f * overlay.pattern.width + 1e-4f;
+        for (int k = 0; k < kMaxSheets; ++k) {
+            float met = 0.0f, mask = 0.0f;
+            V3f met_normal;
+            const float footprint = path.width + path.spread * begin;
+            if (!next_fracture(overlay.pattern, origin, direction, begin, is_found ? t : reach, footprint, met, mask,
+                               met_normal)) {
+                break;
+            }
+            if (coin.next_1d() < mask * opacity) {
+                t = met, color = overlay.color, is_found = true;
+                resolver_.rest_to_world(object).multDirMatrix(met_normal, normal);
+                break;
+            }
+            begin = met + 1e-4f * overlay.pattern.size;
+        }
+    }
+    return is_found;
+}
+
+// A fracture plane: a thin diffuse sheet that sends half of its light to either side.
+bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const {
+    const int body = interiors_.filling(path.inside);
+    const auto cosine_pdf = [&](const V3f& wi) { return 0.5f * kInvPi * std::abs(normal.dot(wi)); };
+    if (!lights_.is_empty()) {
+        const float u_pick = path.sampler.next_1d();
+        const LightSample sample = lights_.sample(position, u_pick, path.sampler.next_2d());
+        const float value = cosine_pdf(sample.direction);
+        if (sample.pdf > 0.0f && value > 0.0f) {
+            bool is_straight = true;
+            const Rgb visible =
+                interiors_.visibility({position, sample.direction, 0.0f, sample.distance * (1.0f - 1e-4f)}, path.inside,
+                                      tile.rays, true, &is_straight);
+            const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value);
+            const Light& light = lights_.lights()[std::size_t(sample.light)];
+            Scattering weights = path.weights();
+            weights.scale(color * (value * multiplier(light, LightComponent::refraction)));
+            deliver(path, Component::refraction, weights, group_of_light_[std::size_t(sample.light)],
+                    sample.radiance * visible * (mis / sample.pdf), tile);
+        }
+    }
+    if (path.scattered >= max_bounces_ || path.inner >= kMaxInnerBounces) {
+        Core core = path.core;
+        core.is_primary = false;
+        core.position = position;
+        request_gather(path, core, color, tile);
+        return false;
+    }
+    ++path.scattered, ++path.inner;
+    const float u_side = path.sampler.next_1d();
+    const V3f local = cosine_hemisphere(path.sampler.next_2d());
+    const V3f wi = Frame(u_side < 0.5f ? normal : -normal).to_world(local);
+    path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)});
+    path.is_delta = false;
+    path.has_direct_light = true;
+    path.light_share = Rgb(1.0f);
+    path.spread += kScatteredSpread;
+    path.ray = {position, wi};
+    Core core = path.core;
+    core.is_primary = false;
+    core.position = position;
+    path.begin_piece(core, bodies_[std::size_t(body)]->material->volume);
+    return true;
 }
 
 // From inside: light of the outside, then reflect or go through.
@@ -448,7 +567,13 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         return false;
     }
     ++path.inner;
-    const float alpha = refraction_alpha(ice, surface.st);
+    // What lies on the boundary is seen from below as the core sees it.
+    if (const float covered = surface.covering.covered; covered > 0.0f) {
+        request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
+        path.last.scale(Rgb(1.0f - covered));
+        if (covered >= 1.0f) return false;
+    }
+    const float alpha = refraction_alpha(ice, surface);
     if (crossing.to == InsideOf::kNone) add_light_beyond(path, surface, crossing, alpha, sampler, tile);
 
     const Frame frame(surface.normal);
@@ -471,10 +596,8 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
                         on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     }
     const int body = interiors_.filling(path.inside);
-    if (body != InsideOf::kNone) {
-        path.core = core_at(surface, body);
-        path.volume = bodies_[std::size_t(body)]->material->volume;
-    }
+    path.spread += lobe_spread(alpha);
+    if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
     return true;
 }
 
@@ -544,7 +667,7 @@ void PathTracer::add_entering_light(Core& core, const Surface& surface, const Bo
         return;
     }
     const Light& light = lights_.lights()[std::size_t(sample.light)];
-    const float entering = body.transmittance(cosine, eval_float(ice.roughness, surface.st));
+    const float entering = body.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
     core.entering =
         sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
     core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);

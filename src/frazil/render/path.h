@@ -28,7 +28,7 @@ class PathTracer {
     // Everything must outlive the tracer. `group_of_light` gives each light's index among the light groups.
     PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-               int max_bounces);
+               int max_bounces, const PixelCone& pixel = {});
 
     // Trace one sample. `sampler` stands after the camera's own dimensions.
     void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
@@ -59,6 +59,8 @@ class PathTracer {
     bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const Core& core,
                Sampler& sampler) const;
     bool cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const;
+    bool find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const;
+    bool meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const;
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
     void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
@@ -74,6 +76,7 @@ class PathTracer {
     SingleScattering single_scattering_;
     InsideOf camera_inside_;
     int max_bounces_;
+    PixelCone pixel_;
 };
 
 }  // namespace frazil

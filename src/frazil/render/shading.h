@@ -1,6 +1,6 @@
 // How a surface scatters light: one face over the material models.
-// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection alone (its core answers by gather and
-//   by refracted rays: path.h).
+// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection over the diffuse one of its overlays (its
+//   core answers by gather and by refracted rays: path.h).
 // Units: f * cos per steradian.
 // Valid: reflection only: zero where a direction is below the geometric surface.
 #pragma once
@@ -47,8 +47,9 @@ class Shader {
     V3f geometric_normal_, normal_, tangent_, bitangent_;
     std::optional<StandardBsdf> standard_;
     const Body* body_ = nullptr;
-    float alpha_ = 0.0f;           // of the ice's boundary
-    Rgb core_albedo_ = Rgb(0.0f);  // of the ice under its boundary
+    // Of ice: its boundary, the core under it, and what its overlays scatter.
+    float alpha_ = 0.0f, roughness_ = 0.0f, diffuse_chance_ = 0.0f;
+    Rgb core_albedo_ = Rgb(0.0f), reflectance_ = Rgb(0.0f);
 };
 
 }  // namespace frazil

@@ -1,0 +1,32 @@
+// Noise in space: the raw matter of patterns. Pure functions of place and seed, without seams or period.
+// Model: gradient noise on a hashed lattice; cells about one jittered point each, with the exact distance to their walls.
+// Units: of the lattice: one cell is 1 wide.
+// Valid: |place| < 1e6; the same bits everywhere.
+// Not: derivatives.
+#pragma once
+
+#include <cstdint>
+
+#include "frazil/base/vec.h"
+
+namespace frazil {
+
+// Smooth, about -0.8..0.8, mean 0.
+float gradient_noise(const V3f& place, std::uint32_t seed);
+
+// Octaves of it, each half as strong and twice as fine; those finer than the footprint (radius) fade out.
+float fractal_noise(const V3f& place, int octaves, float footprint, std::uint32_t seed);
+
+// Where the place lies in the cells about one random point per lattice cell.
+struct CellWall {
+    float distance = 0.0f;   // to the nearest wall
+    V3f normal = V3f(0.0f);  // of that wall
+    std::uint32_t id = 0;    // of the wall: the same from both sides
+};
+CellWall nearest_cell_wall(const V3f& place, std::uint32_t seed);
+
+// The random point of a lattice cell, and three numbers in [0, 1) of the cell.
+V3f cell_point(int x, int y, int z, std::uint32_t seed);
+std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed);
+
+}  // namespace frazil
