@@ -163,7 +163,7 @@ OVERLAY_INPUTS: tuple[MaterialInput, ...] = (
         "vector",
         (0.0, 1.0, 0.0),
         -INFINITY,
-        meaning="up for snow and frost, across bands; the stage's up axis",
+        meaning="up for snow and frost, across bands",
     ),
     MaterialInput("seed", "int", 0, 0, 2**31 - 1, meaning="another number, another pattern"),
     MaterialInput("mask", "float", 1.0, 0.0, 1.0, takes_texture=True, meaning="multiplies the pattern"),

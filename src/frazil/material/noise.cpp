@@ -1,7 +1,5 @@
 #include "frazil/material/noise.h"
 
-#include "frazil/base/random.h"
-
 namespace frazil {
 namespace {
 
@@ -17,33 +15,39 @@ float gradient(std::uint32_t bits, float x, float y, float z) {
     return ((h & 1U) ? -u : u) + ((h & 2U) ? -v : v);
 }
 
-float mix(float a, float b, float t) {
-    return a + (b - a) * t;
-}
-
-}  // namespace
-
-std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed) {
-    return hash(hash(std::uint32_t(x) * 0x8da6b343U ^ std::uint32_t(y) * 0xd8163841U ^ std::uint32_t(z) * 0xcb1ab31fU) +
-                seed * 0x9e3779b9U);
-}
-
-V3f cell_point(int x, int y, int z, std::uint32_t seed) {
-    const std::uint32_t h = cell_hash(x, y, z, seed);
-    return V3f(float(x), float(y), float(z)) +
-           V3f(to_unit_float(h), to_unit_float(hash(h)), to_unit_float(hash(h + 1U)));
-}
-
-float gradient_noise(const V3f& place, std::uint32_t seed) {
+// Smoothly between the values that the eight corners of the lattice cell give.
+template <class Value, class Corner>
+Value interpolate(const V3f& place, std::uint32_t seed, const Corner& corner) {
     const float fx = std::floor(place.x), fy = std::floor(place.y), fz = std::floor(place.z);
     const int x = int(fx), y = int(fy), z = int(fz);
     const float dx = place.x - fx, dy = place.y - fy, dz = place.z - fz;
     const float u = fade(dx), v = fade(dy), w = fade(dz);
-    const auto corner = [&](int i, int j, int k) {
-        return gradient(cell_hash(x + i, y + j, z + k, seed) >> 16, dx - float(i), dy - float(j), dz - float(k));
+    const auto at = [&](int i, int j, int k) {
+        return corner(cell_hash(x + i, y + j, z + k, seed), dx - float(i), dy - float(j), dz - float(k));
     };
-    return mix(mix(mix(corner(0, 0, 0), corner(1, 0, 0), u), mix(corner(0, 1, 0), corner(1, 1, 0), u), v),
-               mix(mix(corner(0, 0, 1), corner(1, 0, 1), u), mix(corner(0, 1, 1), corner(1, 1, 1), u), v), w);
+    const auto mix = [](const Value& a, const Value& b, float t) { return a + (b - a) * t; };
+    return mix(mix(mix(at(0, 0, 0), at(1, 0, 0), u), mix(at(0, 1, 0), at(1, 1, 0), u), v),
+               mix(mix(at(0, 0, 1), at(1, 0, 1), u), mix(at(0, 1, 1), at(1, 1, 1), u), v), w);
+}
+
+}  // namespace
+
+V3f cell_point(int x, int y, int z, std::uint32_t seed) {
+    const std::uint32_t h = cell_hash(x, y, z, seed);
+    constexpr float kTenBits = 1.0f / 1024.0f;
+    return V3f(float(x), float(y), float(z)) +
+           V3f(float(h & 1023U) + 0.5f, float((h >> 10) & 1023U) + 0.5f, float((h >> 20) & 1023U) + 0.5f) * kTenBits;
+}
+
+float gradient_noise(const V3f& place, std::uint32_t seed) {
+    return interpolate<float>(place, seed,
+                              [](std::uint32_t h, float x, float y, float z) { return gradient(h >> 16, x, y, z); });
+}
+
+V3f vector_noise(const V3f& place, std::uint32_t seed) {
+    return interpolate<V3f>(place, seed, [](std::uint32_t h, float x, float y, float z) {
+        return V3f(gradient(h >> 8, x, y, z), gradient(h >> 16, x, y, z), gradient(h >> 24, x, y, z));
+    });
 }
 
 float fractal_noise(const V3f& place, int octaves, float footprint, std::uint32_t seed) {
@@ -58,35 +62,51 @@ float fractal_noise(const V3f& place, int octaves, float footprint, std::uint32_
     return sum;
 }
 
-CellWall nearest_cell_wall(const V3f& place, std::uint32_t seed) {
+CellWall nearest_cell_wall(const V3f& place, float reach, std::uint32_t seed) {
     const int x = int(std::floor(place.x)), y = int(std::floor(place.y)), z = int(std::floor(place.z));
-    V3f points[125];
-    std::uint32_t ids[125];
-    int count = 0, nearest = 0;
-    float best = 1e30f;
-    for (int k = -2; k <= 2; ++k) {
-        for (int j = -2; j <= 2; ++j) {
-            for (int i = -2; i <= 2; ++i) {
-                if (i * i + j * j + k * k > 8) continue;  // corners are too far to matter
-                points[count] = cell_point(x + i, y + j, z + k, seed) - place;
-                ids[count] = cell_hash(x + i, y + j, z + k, seed);
-                const float distance2 = points[count].length2();
-                if (distance2 < best) best = distance2, nearest = count;
-                ++count;
-            }
+    const V3f inside(place.x - float(x), place.y - float(y), place.z - float(z));
+    // The squared distance from the place to a lattice cell, by axis.
+    float gap[3][5];
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int i = -2; i <= 2; ++i) {
+            const float g = std::max(0.0f, std::max(float(i) - inside[axis], inside[axis] - float(i + 1)));
+            gap[axis][i + 2] = g * g;
         }
     }
+    const auto visit = [&](float& within2, const auto& see) {
+        for (int k = -2; k <= 2; ++k) {
+            for (int j = -2; j <= 2; ++j) {
+                const float side = gap[2][k + 2] + gap[1][j + 2];
+                if (side > within2) continue;
+                for (int i = -2; i <= 2; ++i) {
+                    if (side + gap[0][i + 2] <= within2) see(i, j, k);
+                }
+            }
+        }
+    };
+    // The nearest point: its own cell's first, which leaves little to look through.
+    V3f nearest = cell_point(x, y, z, seed) - place;
+    V3i nearest_cell(0);
+    float best = nearest.length2();
+    visit(best, [&](int i, int j, int k) {
+        const V3f point = cell_point(x + i, y + j, z + k, seed) - place;
+        if (point.length2() < best) best = point.length2(), nearest = point, nearest_cell = V3i(i, j, k);
+    });
+    // A wall stands half way between two points: those within reach are of points not much farther than the nearest.
     CellWall wall;
-    wall.distance = 1e30f;
-    for (int i = 0; i < count; ++i) {
-        if (i == nearest) continue;
-        const V3f across = points[i] - points[nearest];
+    float within = std::sqrt(best) + 2.0f * reach;
+    within *= within;
+    visit(within, [&](int i, int j, int k) {
+        if (V3i(i, j, k) == nearest_cell) return;
+        const V3f point = cell_point(x + i, y + j, z + k, seed) - place, across = point - nearest;
         const float length = across.length();
-        if (!(length > 1e-6f)) continue;
-        // The wall stands half way between the two points.
-        const float distance = (points[i] + points[nearest]).dot(across) / (2.0f * length);
-        if (distance < wall.distance) wall = {distance, across / length, ids[i] ^ ids[nearest]};
-    }
+        if (!(length > 1e-6f)) return;
+        const float distance = (point + nearest).dot(across) / (2.0f * length);
+        if (distance >= wall.distance || distance > reach) return;
+        const V3i& n = nearest_cell;
+        const std::uint32_t id = cell_hash(x + i, y + j, z + k, seed) ^ cell_hash(x + n.x, y + n.y, z + n.z, seed);
+        wall = {distance, across / length, id};
+    });
     return wall;
 }
 

@@ -41,7 +41,7 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
         const float drawn = std::clamp(eval_float(overlay.mask, st), 0.0f, 1.0f);
         if (!(drawn > 0.0f)) continue;
         const float mask = eval_pattern(overlay.pattern, at);
-        if (with_slope && overlay.bump != 0.0f) {
+        if (with_slope && overlay.bump != 0.0f && mask > 0.0f) {
             const float step = std::max(point.footprint, 0.25f * overlay.pattern.width + 1e-5f);
             for (int axis = 0; axis < 3; ++axis) {
                 at.position = point.position;

@@ -88,13 +88,16 @@ float cells_mask(const Pattern& pattern, const PatternPoint& at) {
         const std::uint32_t seed = pattern.seed + 101U * std::uint32_t(scale);
         V3f place = at.position / size;
         if (pattern.warp > 0.0f) {
-            const V3f bent(gradient_noise(place * 1.3f, seed + 1U), gradient_noise(place * 1.3f, seed + 2U),
-                           gradient_noise(place * 1.3f, seed + 3U));
-            const V3f fine(gradient_noise(place * 5.1f, seed + 4U), gradient_noise(place * 5.1f, seed + 5U),
-                           gradient_noise(place * 5.1f, seed + 6U));
+            const V3f bent = vector_noise(place * 1.3f, seed + 1U), fine = vector_noise(place * 5.1f, seed + 4U);
             place += (bent + fine * 0.25f) * pattern.warp;
         }
-        const CellWall wall = nearest_cell_wall(place, seed);
+        // Flat angles widen a line, and the footprint its edge.
+        const float reach = (0.5f * (width + feather) + at.footprint) / size;
+        const CellWall wall = nearest_cell_wall(place, reach, seed);
+        if (!(wall.distance < 1e30f)) {
+            size /= 2.3f, width /= 1.7f, feather /= 1.7f;
+            continue;
+        }
         const float distance = along_surface(wall.distance * size, wall.normal, at.normal);
         const float line = line_mask(distance, width, feather, at.footprint);
         if (line > 0.0f) {
@@ -113,9 +116,7 @@ float frost_mask(const Pattern& pattern, const PatternPoint& at) {
     const int octaves = 1 + std::max(0, pattern.scales);
     V3f bent = place;
     if (pattern.warp > 0.0f) {
-        bent += V3f(gradient_noise(place, pattern.seed + 11U), gradient_noise(place, pattern.seed + 12U),
-                    gradient_noise(place, pattern.seed + 13U)) *
-                pattern.warp;
+        bent += vector_noise(place, pattern.seed + 11U) * pattern.warp;
     }
     const float growth = fractal_noise(bent, octaves + 2, footprint, pattern.seed);
     // Crystals: fine ridges within the growth.
@@ -137,7 +138,11 @@ float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
                 if (to_unit_float(hash(h, 3U)) > pattern.amount) continue;
                 const V3f center = cell_point(x + i, y + j, z + k, pattern.seed) * pattern.size;
                 const float diameter = pattern.width * (0.35f + 0.65f * to_unit_float(hash(h, 4U)));
-                left *= 1.0f - line_mask((center - at.position).length(), diameter, pattern.feather, at.footprint);
+                // A spot fades in both directions across a footprint that is wider than it.
+                const float blur = at.footprint + 0.5f * pattern.feather;
+                const float fading = std::min(1.0f, diameter / std::max(2.0f * blur, 1e-9f));
+                left *=
+                    1.0f - fading * line_mask((center - at.position).length(), diameter, pattern.feather, at.footprint);
             }
         }
     }

@@ -20,6 +20,8 @@ constexpr int kMaxTransparentHits = 64;
 constexpr int kMaxInnerBounces = 8, kMaxVolumePieces = 2;
 // A refracted path that is worth less than this goes on by chance only.
 constexpr float kFaint = 0.02f;
+// Overlays that cover less than this are not seen from below.
+constexpr float kHiding = 0.01f;
 // How much wider an opaque surface makes the cone that a path stands for, per metre.
 constexpr float kScatteredSpread = 0.05f;
 constexpr std::uint32_t kSheetDimensions = 16384;
@@ -158,6 +160,11 @@ struct PathTracer::Path {
     void begin_vertex() { sampler.set_dimension(kDimensionsPerVertex * ++vertex); }
 };
 
+// Overlays on the way of light need no detail.
+float PathTracer::shadow_footprint(const Path& path) {
+    return 4.0f * path.width;
+}
+
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
                        int max_bounces, const PixelCone& pixel)
@@ -220,7 +227,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
 
         const V3f wo = -path.ray.direction;
         path.width += path.spread * length;
-        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, true);
+        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
@@ -377,7 +384,8 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     bool is_straight = true;
-    const Rgb visible = interiors_.visibility(shadow, path.inside, tile.rays, true, &is_straight);
+    const Rgb visible =
+        interiors_.visibility(shadow, path.inside, tile.rays, true, &is_straight, shadow_footprint(path));
     if (visible == Rgb(0.0f)) return;
     // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight) specular_lobe = Rgb(0.0f);
@@ -449,7 +457,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
 
     Rgb once(0.0f);
     if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
-        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside};
+        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside, shadow_footprint(path)};
         const OnceScattered scattered = single_scattering_.sample(segment, sampler, tile.rays);
         once = scattered.share * path.volume;
         if (scattered.light >= 0 && scattered.radiance != Rgb(0.0f)) {
@@ -517,7 +525,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
             bool is_straight = true;
             const Rgb visible =
                 interiors_.visibility({position, sample.direction, 0.0f, sample.distance * (1.0f - 1e-4f)}, path.inside,
-                                      tile.rays, true, &is_straight);
+                                      tile.rays, true, &is_straight, shadow_footprint(path));
             const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value);
             const Light& light = lights_.lights()[std::size_t(sample.light)];
             Scattering weights = path.weights();
@@ -568,7 +576,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     }
     ++path.inner;
     // What lies on the boundary is seen from below as the core sees it.
-    if (const float covered = surface.covering.covered; covered > 0.0f) {
+    if (const float covered = surface.covering.covered; covered > kHiding) {
         request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
         path.last.scale(Rgb(1.0f - covered));
         if (covered >= 1.0f) return false;
@@ -620,7 +628,8 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
-    const Rgb visible = interiors_.visibility(shadow, crossing.beyond, tile.rays, true, &is_straight);
+    const Rgb visible =
+        interiors_.visibility(shadow, crossing.beyond, tile.rays, true, &is_straight, shadow_footprint(path));
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];

@@ -42,6 +42,7 @@ class PathTracer {
   private:
     struct Path;
     struct Core;
+    static float shadow_footprint(const Path& path);
     // Follow a path to its end; a part that is split off goes to `split`, where there is room for one.
     void follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
 
