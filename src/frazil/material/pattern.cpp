@@ -227,18 +227,20 @@ bool next_fracture(const Pattern& pattern, const V3f& origin, const V3f& directi
         const PlaneFamily planes(pattern, family);
         const float speed = direction.dot(planes.normal);
         if (std::abs(speed) < 1e-3f) continue;
-        const float begin = planes.height(pattern, origin + direction * t_min);
-        const int first = int(std::floor(begin / planes.pitch)) + (speed > 0.0f ? -1 : 1);
+        // A bent plane is met within so much of where a straight one would be.
+        const float margin = pattern.warp * pattern.size / std::abs(speed), base = origin.dot(planes.normal);
         const int step = speed > 0.0f ? 1 : -1;
+        const int first = int(std::floor((base + speed * t_min) / planes.pitch)) - 2 * step;
         for (int k = 0; k < 64; ++k) {
             const int i = first + step * k;
-            // Where the straight plane is met, then nearer and nearer to where the bent one is.
-            float s = (planes.offset(i) - origin.dot(planes.normal)) / speed;
-            for (int refine = 0; refine < 5; ++refine) {
+            const float straight = (planes.offset(i) - base) / speed, limit = is_found ? t : t_max;
+            if (straight + margin <= t_min) continue;
+            if (straight - margin >= limit) break;
+            float s = straight;
+            for (int refine = 0; refine < (pattern.warp > 0.0f ? 4 : 0); ++refine) {
                 s += (planes.offset(i) - planes.height(pattern, origin + direction * s)) / speed;
             }
-            if (s <= t_min) continue;
-            if (s >= (is_found ? t : t_max)) break;
+            if (s <= t_min || s >= limit) continue;
             const float there = planes.extent(pattern, origin + direction * s, i, footprint);
             if (there <= 0.0f) continue;
             t = s, mask = there, normal = planes.normal, is_found = true;

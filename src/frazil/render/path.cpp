@@ -89,7 +89,8 @@ struct PathTracer::Path {
     bool is_delta = false;  // lights could not be chosen at the last vertex
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
-    bool has_direct_light = false;
+    bool has_direct_light = false, is_glossy = false;
+    bool sees_lamps = true;  // lights other than domes; not after reflections inside ice, where they would be sparks
     Rgb light_share = Rgb(1.0f);
 
     InsideOf inside;
@@ -131,7 +132,8 @@ struct PathTracer::Path {
         if (!has_direct_light) return;
         for (int c = 0; c < 3; ++c) {
             const float all = last.diffuse[c] + last.specular[c] + last.refraction[c];
-            light_share[c] *= all > 0.0f ? 1.0f - last.diffuse[c] / all : 0.0f;
+            const float served = is_glossy ? last.diffuse[c] : last.diffuse[c] + last.specular[c];
+            light_share[c] *= all > 0.0f ? 1.0f - served / all : 0.0f;
         }
         has_direct_light = false;
     }
@@ -311,7 +313,8 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         path.scatter(value);
         ++path.scattered;
         path.is_delta = false;
-        path.has_direct_light = true;
+        path.has_direct_light = path.sees_lamps = true;
+        path.is_glossy = shader.is_glossy();
         path.light_share = Rgb(1.0f);
         path.spread += kScatteredSpread;
         split = nullptr;
@@ -353,7 +356,8 @@ void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) co
     lights_.intersect(path.ray.origin, path.ray.direction, t_max, hits);
     for (const LightHit& hit : hits) {
         const Light& light = lights_.lights()[std::size_t(hit.light)];
-        if (path.bounce == 0 && !std::holds_alternative<DomeLight>(light.shape)) continue;
+        const bool is_dome = std::holds_alternative<DomeLight>(light.shape);
+        if ((path.bounce == 0 || !path.sees_lamps) && !is_dome) continue;
         const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
             deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
@@ -387,8 +391,8 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     const Rgb visible =
         interiors_.visibility(shadow, path.inside, tile.rays, true, &is_straight, shadow_footprint(path));
     if (visible == Rgb(0.0f)) return;
-    // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
-    if (!is_straight) specular_lobe = Rgb(0.0f);
+    // Through a boundary broad lobes take light along a straight line; what is seen in a glossy one is refracted.
+    if (!is_straight && shader.is_glossy()) specular_lobe = Rgb(0.0f);
 
     const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
     const Rgb light_over_pdf = sample.radiance * visible * (mis / sample.pdf);
@@ -547,7 +551,8 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     const V3f wi = Frame(u_side < 0.5f ? normal : -normal).to_world(local);
     path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)});
     path.is_delta = false;
-    path.has_direct_light = true;
+    path.has_direct_light = path.sees_lamps = true;
+    path.is_glossy = false;
     path.light_share = Rgb(1.0f);
     path.spread += kScatteredSpread;
     path.ray = {position, wi};
@@ -590,7 +595,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
     if (sample.is_reflection) {
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
-        path.has_direct_light = false;
+        path.has_direct_light = path.sees_lamps = false;
         path.light_share = Rgb(1.0f);
         path.is_delta = true;
         path.leave_from(surface.position, surface.geometric_normal,
@@ -633,6 +638,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
+    if (!path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) return;
     Scattering weights = path.weights();
     weights.scale(Rgb(value * multiplier(light, LightComponent::refraction)));
     // Before the first lobe the boundary itself is the first.

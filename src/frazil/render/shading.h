@@ -31,6 +31,8 @@ class Shader {
 
     // The fraction of light that the surface stops: 1 but for cut-out standard materials.
     float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
+    // Whether what is seen in the reflection has edges, so that light through ice must be bent in it.
+    bool is_glossy() const { return (standard_ ? standard_->alpha() : alpha_) < kGlossyAlpha; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
     // The share of light from all around that goes towards wo, all lobes together.
@@ -41,6 +43,7 @@ class Shader {
     bool sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const;
 
   private:
+    static constexpr float kGlossyAlpha = 0.1f;
     V3f to_local(const V3f& v) const { return {v.dot(tangent_), v.dot(bitangent_), v.dot(normal_)}; }
     V3f to_world(const V3f& v) const { return tangent_ * v.x + bitangent_ * v.y + normal_ * v.z; }
 
