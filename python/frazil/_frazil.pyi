@@ -116,6 +116,9 @@ class PointSet:
     Points on a mesh that stand for its surface. The arrays are views of the set's own memory.
     """
 
+    def __init__(self) -> None:
+        """No points."""
+
     @property
     def positions(self) -> NDArray[numpy.float32]:
         """(N, 3) float32, metres."""
@@ -385,6 +388,310 @@ def area_compensation(coverage: object, profile: object, mode: str = 'ratio', li
     Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to add
     per unit of irradiance at the shading point.
     """
+
+class DomeLight:
+    """
+    Light from all around.
+
+    Parameters
+    ----------
+    image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a
+        uniform dome. Copied.
+    """
+
+    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight') -> None: ...
+
+    @property
+    def has_image(self) -> bool: ...
+
+    @property
+    def image(self) -> object:
+        """(height, width, 3) float32, or None."""
+
+    def radiance(self, direction: Sequence[float]) -> list[float]:
+        """
+        Radiance from a unit direction in the light's own frame; 1 without an image.
+        """
+
+class DistantLight:
+    """A sun along -z; `angle` is its full angle in degrees."""
+
+    def __init__(self, angle: float = 0.5299999713897705) -> None: ...
+
+    @property
+    def angle(self) -> float: ...
+
+    @angle.setter
+    def angle(self, arg: float, /) -> None: ...
+
+class RectLight:
+    """
+    A rectangle in x and y that shines along -z, in the light's units.
+
+    Parameters
+    ----------
+    width, height : the sides.
+    image : (height, width, 3) float32 that multiplies the radiance, upright (+y up) as seen from
+        the side that shines, or None. Copied.
+    """
+
+    def __init__(self, width: float = 1.0, height: float = 1.0, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'RectLight') -> None: ...
+
+    @property
+    def has_image(self) -> bool: ...
+
+    @property
+    def image(self) -> object:
+        """(height, width, 3) float32, or None."""
+
+    @property
+    def width(self) -> float: ...
+
+    @width.setter
+    def width(self, arg: float, /) -> None: ...
+
+    @property
+    def height(self) -> float: ...
+
+    @height.setter
+    def height(self, arg: float, /) -> None: ...
+
+class DiskLight:
+    """A disk in x and y that shines along -z, in the light's units."""
+
+    def __init__(self, radius: float = 0.5) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class SphereLight:
+    """A sphere that shines outwards, in the light's units."""
+
+    def __init__(self, radius: float = 0.5) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class CylinderLight:
+    """
+    A tube about x without caps that shines outwards, in the light's units.
+    """
+
+    def __init__(self, length: float = 1.0, radius: float = 0.5) -> None: ...
+
+    @property
+    def length(self) -> float: ...
+
+    @length.setter
+    def length(self, arg: float, /) -> None: ...
+
+    @property
+    def radius(self) -> float: ...
+
+    @radius.setter
+    def radius(self, arg: float, /) -> None: ...
+
+class MeshLight:
+    """
+    A mesh that shines along its normals.
+
+    Parameters
+    ----------
+    mesh : Mesh, in the light's frame. Copied.
+    object : index of the scene's object that shows this mesh at the light's matrix; None = none,
+        then rays do not run into the light.
+    triangle_factors : (F, 3) float32 that multiplies the radiance by triangle, or None.
+    is_two_sided : shine from both sides.
+    is_material : it stands for the emission of the object's material, which the camera sees itself.
+    """
+
+    def __init__(self, mesh: Mesh, object: int | None = None, triangle_factors: numpy.typing.ArrayLike | None = None, *, is_two_sided: bool = False, is_material: bool = False) -> None: ...
+
+    @property
+    def object(self) -> int | None: ...
+
+    @property
+    def mesh(self) -> Mesh:
+        """A copy of the mesh."""
+
+    @property
+    def triangle_factors(self) -> object:
+        """(F, 3) float32, or None."""
+
+    @property
+    def is_two_sided(self) -> bool: ...
+
+    @property
+    def is_material(self) -> bool: ...
+
+class ObjectSet:
+    """
+    Objects of a scene by index, for light and shadow linking. Lights may share one.
+    """
+
+    def __init__(self, objects: Sequence[int]) -> None: ...
+
+    @property
+    def objects(self) -> list[int]: ...
+
+    def __len__(self) -> int: ...
+
+class Shaping:
+    """
+    How the light depends on the angle from -z (UsdLuxShapingAPI).
+
+    Parameters
+    ----------
+    cone_angle : degrees from the axis beyond which nothing shines, 0 to 180; 180 = no cone.
+    cone_softness : >= 0; the part of the angle over which the light fades.
+    focus : >= 0; exponent of the cosine. focus_tint : RGB that takes the place of what focus removes.
+    """
+
+    def __init__(self, *, cone_angle: float = 180.0, cone_softness: float = 0.0, focus: float = 0.0, focus_tint: Sequence[float] = [0.0, 0.0, 0.0]) -> None: ...
+
+    @property
+    def cone_angle(self) -> float: ...
+
+    @property
+    def cone_softness(self) -> float: ...
+
+    @property
+    def focus(self) -> float: ...
+
+    @property
+    def focus_tint(self) -> list[float]: ...
+
+class ShadowRules:
+    """
+    How a light's shadows depart from opaque ones (UsdLuxShadowAPI).
+
+    Parameters
+    ----------
+    is_enabled : whether it casts shadows.
+    color : RGB, what is left of the light in shadow.
+    distance : metres from the shadowed place within which things cast shadows; < 0 = any.
+    falloff : metres within `distance` over which the shadow fades; < 0 = none.
+    falloff_gamma : exponent of the fade, > 0.
+    casters : ObjectSet of the only objects that cast shadows, None = all.
+    """
+
+    def __init__(self, *, is_enabled: bool = True, color: Sequence[float] = [0.0, 0.0, 0.0], distance: float = -1.0, falloff: float = -1.0, falloff_gamma: float = 1.0, casters: ObjectSet | None = None) -> None: ...
+
+    @property
+    def is_enabled(self) -> bool: ...
+
+    @property
+    def color(self) -> list[float]: ...
+
+    @property
+    def distance(self) -> float: ...
+
+    @property
+    def falloff(self) -> float: ...
+
+    @property
+    def falloff_gamma(self) -> float: ...
+
+    @property
+    def casters(self) -> ObjectSet: ...
+
+    def with_casters(self, casters: ObjectSet | None) -> ShadowRules:
+        """The same rules with other casters."""
+
+class Light:
+    """
+    A light of the scene.
+
+    Parameters
+    ----------
+    shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight or MeshLight.
+    radiance : RGB, the product of intensity, exposure, colour and colour temperature.
+    matrix : (4, 4) float64 light to world, for row vectors; None = identity.
+    path : name for messages. group : light group, '' = the default one.
+    normalize : divide by the light's area in square metres.
+    diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.
+    shaping : Shaping. shadow : ShadowRules.
+    lit : ObjectSet of the only objects that it lights, None = all.
+    """
+
+    def __init__(self, shape: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight | MeshLight, *, radiance: Sequence[float] = [1.0, 1.0, 1.0], matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, path: str = 'Light', group: str = '', normalize: bool = False, diffuse: float = 1.0, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, volume: float = 1.0, shaping: Shaping = ..., shadow: ShadowRules = ..., lit: ObjectSet | None = None) -> None: ...
+
+    @property
+    def path(self) -> str: ...
+
+    @path.setter
+    def path(self, arg: str, /) -> None: ...
+
+    @property
+    def group(self) -> str: ...
+
+    @group.setter
+    def group(self, arg: str, /) -> None: ...
+
+    @property
+    def shape(self) -> DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight | MeshLight: ...
+
+    @shape.setter
+    def shape(self, arg: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight | MeshLight, /) -> None: ...
+
+    @property
+    def radiance(self) -> list[float]: ...
+
+    @radiance.setter
+    def radiance(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def normalize(self) -> bool: ...
+
+    @normalize.setter
+    def normalize(self, arg: bool, /) -> None: ...
+
+    @property
+    def shaping(self) -> Shaping: ...
+
+    @shaping.setter
+    def shaping(self, arg: Shaping, /) -> None: ...
+
+    @property
+    def shadow(self) -> ShadowRules: ...
+
+    @shadow.setter
+    def shadow(self, arg: ShadowRules, /) -> None: ...
+
+    @property
+    def lit(self) -> ObjectSet: ...
+
+    @lit.setter
+    def lit(self, lit: ObjectSet | None) -> None: ...
+
+    @property
+    def matrix(self) -> object: ...
+
+    @matrix.setter
+    def matrix(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)], /) -> None: ...
+
+    @property
+    def diffuse(self) -> float: ...
+
+    @property
+    def specular(self) -> float: ...
+
+    @property
+    def translucency(self) -> float: ...
+
+    @property
+    def refraction(self) -> float: ...
+
+    @property
+    def volume(self) -> float: ...
+
+    def __repr__(self) -> str: ...
 
 class RayScene:
     """
@@ -855,164 +1162,6 @@ class IceMaterial:
 
     def __repr__(self) -> str: ...
 
-class DomeLight:
-    """
-    Light from all around.
-
-    Parameters
-    ----------
-    image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a
-        uniform dome. Copied.
-    """
-
-    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight') -> None: ...
-
-    @property
-    def has_image(self) -> bool: ...
-
-    def radiance(self, direction: Sequence[float]) -> list[float]:
-        """
-        Radiance from a unit direction in the light's own frame; 1 without an image.
-        """
-
-class DistantLight:
-    """A sun along -z; `angle` is its full angle in degrees."""
-
-    def __init__(self, angle: float = 0.5299999713897705) -> None: ...
-
-    @property
-    def angle(self) -> float: ...
-
-    @angle.setter
-    def angle(self, arg: float, /) -> None: ...
-
-class RectLight:
-    """A rectangle in x and y that shines along -z, in the light's units."""
-
-    def __init__(self, width: float = 1.0, height: float = 1.0) -> None: ...
-
-    @property
-    def width(self) -> float: ...
-
-    @width.setter
-    def width(self, arg: float, /) -> None: ...
-
-    @property
-    def height(self) -> float: ...
-
-    @height.setter
-    def height(self, arg: float, /) -> None: ...
-
-class DiskLight:
-    """A disk in x and y that shines along -z, in the light's units."""
-
-    def __init__(self, radius: float = 0.5) -> None: ...
-
-    @property
-    def radius(self) -> float: ...
-
-    @radius.setter
-    def radius(self, arg: float, /) -> None: ...
-
-class SphereLight:
-    """A sphere that shines outwards, in the light's units."""
-
-    def __init__(self, radius: float = 0.5) -> None: ...
-
-    @property
-    def radius(self) -> float: ...
-
-    @radius.setter
-    def radius(self, arg: float, /) -> None: ...
-
-class CylinderLight:
-    """
-    A tube about x without caps that shines outwards, in the light's units.
-    """
-
-    def __init__(self, length: float = 1.0, radius: float = 0.5) -> None: ...
-
-    @property
-    def length(self) -> float: ...
-
-    @length.setter
-    def length(self, arg: float, /) -> None: ...
-
-    @property
-    def radius(self) -> float: ...
-
-    @radius.setter
-    def radius(self, arg: float, /) -> None: ...
-
-class Light:
-    """
-    A light of the scene.
-
-    Parameters
-    ----------
-    shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.
-    radiance : RGB, the product of intensity, exposure, colour and colour temperature.
-    matrix : (4, 4) float64 light to world, for row vectors; None = identity.
-    path : name for messages. group : light group, '' = the default one.
-    normalize : divide by the light's area in square metres.
-    diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.
-    """
-
-    def __init__(self, shape: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, *, radiance: Sequence[float] = [1.0, 1.0, 1.0], matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, path: str = 'Light', group: str = '', normalize: bool = False, diffuse: float = 1.0, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, volume: float = 1.0) -> None: ...
-
-    @property
-    def path(self) -> str: ...
-
-    @path.setter
-    def path(self, arg: str, /) -> None: ...
-
-    @property
-    def group(self) -> str: ...
-
-    @group.setter
-    def group(self, arg: str, /) -> None: ...
-
-    @property
-    def shape(self) -> DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight: ...
-
-    @shape.setter
-    def shape(self, arg: DomeLight | DistantLight | RectLight | DiskLight | SphereLight | CylinderLight, /) -> None: ...
-
-    @property
-    def radiance(self) -> list[float]: ...
-
-    @radiance.setter
-    def radiance(self, arg: Sequence[float], /) -> None: ...
-
-    @property
-    def normalize(self) -> bool: ...
-
-    @normalize.setter
-    def normalize(self, arg: bool, /) -> None: ...
-
-    @property
-    def matrix(self) -> object: ...
-
-    @matrix.setter
-    def matrix(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)], /) -> None: ...
-
-    @property
-    def diffuse(self) -> float: ...
-
-    @property
-    def specular(self) -> float: ...
-
-    @property
-    def translucency(self) -> float: ...
-
-    @property
-    def refraction(self) -> float: ...
-
-    @property
-    def volume(self) -> float: ...
-
-    def __repr__(self) -> str: ...
-
 class Camera:
     """
     A camera that looks along -z of its frame, +y up.
@@ -1142,6 +1291,14 @@ class Scene:
 
     def add_light(self, light: Light) -> int:
         """Add a light (copied); its index."""
+
+    def emissive_objects(self) -> list[int]:
+        """Indices of the objects whose material emits light."""
+
+    def triangle_emission(self, object: int) -> numpy.ndarray | None:
+        """
+        Mean radiance (F, 3) float32 that the material of an object emits, by triangle; None where it emits none.
+        """
 
     @property
     def camera(self) -> Camera: ...

@@ -140,7 +140,8 @@ def test_dome_images_that_cannot_be_used(stage, tmp_path, problem):
     scene = load(stage)
     assert len(scene.lights) == 1
     assert scene.lights[0].shape.has_image == (problem == "nan")
-    assert len(scene.warnings) == 1
+    assert all(w.startswith("/Sky: ") for w in scene.warnings)
+    assert scene.warnings
     assert scene.warnings[0].startswith("/Sky: ")
 
 
@@ -173,13 +174,65 @@ def test_flattened_lights_are_left_out(stage):
 
 def test_what_lights_do_not_support_is_named(stage):
     light = UsdLux.SphereLight.Define(stage, "/Light")
-    UsdLux.ShapingAPI.Apply(light.GetPrim()).CreateShapingConeAngleAttr(30)
-    UsdLux.ShadowAPI.Apply(light.GetPrim()).CreateShadowEnableAttr(False)
+    UsdLux.ShapingAPI.Apply(light.GetPrim()).CreateShapingIesFileAttr("lamp.ies")
     light.GetPrim().CreateRelationship("light:filters").SetTargets(["/Filter"])
-    UsdLux.LightAPI(light.GetPrim()).GetLightLinkCollectionAPI().CreateExcludesRel().SetTargets(["/Quad"])
     said = " ".join(load(stage).warnings)
-    for word in ("shaping:cone:angle", "shadow:enable", "light filters", "lightLink"):
+    for word in ("IES", "light filters"):
         assert word in said
+
+
+def test_shaping(stage):
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    assert read_light(stage).shaping.cone_angle == 180  # not applied: to all sides
+    shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
+    assert read_light(stage).shaping.cone_angle == 180  # nothing authored
+    shaping.CreateShapingConeSoftnessAttr(0.25)
+    shaping.CreateShapingFocusAttr(3)
+    shaping.CreateShapingFocusTintAttr((0.5, 0.25, 0))
+    read = read_light(stage).shaping
+    assert (read.cone_angle, read.cone_softness, read.focus) == (90, 0.25, 3)
+    assert list(read.focus_tint) == [0.5, 0.25, 0]
+    shaping.CreateShapingConeAngleAttr(200)
+    scene = load(stage)
+    assert scene.lights[0].shaping.cone_angle == 180
+    assert "/Light: shaping:cone:angle must be in 0..180, got 200. 180 is used." in scene.warnings
+
+
+def test_shadows_are_in_metres(stage):
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    shadow = UsdLux.ShadowAPI.Apply(light.GetPrim())
+    assert read_light(stage).shadow.is_enabled
+    shadow.CreateShadowEnableAttr(False)
+    shadow.CreateShadowColorAttr((0.1, 0.2, 0.3))
+    shadow.CreateShadowDistanceAttr(200)
+    shadow.CreateShadowFalloffAttr(50)
+    shadow.CreateShadowFalloffGammaAttr(2)
+    read = read_light(stage).shadow
+    assert not read.is_enabled
+    np.testing.assert_allclose(read.color, (0.1, 0.2, 0.3), rtol=1e-6)
+    scale = UsdGeom.GetStageMetersPerUnit(stage)
+    np.testing.assert_allclose((read.distance, read.falloff, read.falloff_gamma), (200 * scale, 50 * scale, 2))
+
+
+def test_rect_images_are_read_and_bad_ones_named(stage, tmp_path):
+    write_image(tmp_path / "card.exr", np.ones((4, 8, 3), np.float32), oiio.FLOAT)
+    light = UsdLux.RectLight.Define(stage, "/Light")
+    light.CreateTextureFileAttr(str(tmp_path / "card.exr"))
+    assert read_light(stage).shape.has_image
+    light.GetTextureFileAttr().Set(str(tmp_path / "none.exr"))
+    scene = load(stage)
+    assert not scene.lights[0].shape.has_image
+    assert any(w.startswith("/Light: ") and "It shines evenly." in w for w in scene.warnings)
+
+
+def test_images_that_darken_are_named(stage, tmp_path):
+    dome_with_a_spot(stage, tmp_path, 0, 0)
+    write_image(tmp_path / "sky.exr", np.zeros((4, 8, 3), np.float32), oiio.FLOAT)
+    assert any("is black" in w for w in load(stage).warnings)
+    write_image(tmp_path / "sky.exr", np.full((4, 8, 3), -1.0, np.float32), oiio.FLOAT)
+    scene = load(stage)
+    assert any("/Sky: " in w and "96 negative values" in w for w in scene.warnings)
+    assert scene.lights[0].shape.has_image
 
 
 def test_invisible_lights_are_off(stage):

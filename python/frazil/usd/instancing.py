@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from .._frazil import Scene
 from .context import ReadContext, are_singular, to_array
 from .geometry import MeshPart, material_subsets, read_mesh
 from .gprims import read_gprim
-from .lights import add_light, is_light
+from .lights import LightReader, is_light
+from .linking import LinkReader
 from .materials import MaterialReader
 
 _GPRIMS = frozenset({"Sphere", "Cube", "Cone", "Cylinder", "Cylinder_1", "Capsule", "Capsule_1", "Plane"})
@@ -30,6 +31,8 @@ class StageWalker:
         self._context = context
         self._scene = scene
         self._materials = MaterialReader(context, scene)
+        self._links = LinkReader(context)
+        self._lights = LightReader(context, scene, self._links)
         self._meshes: dict[tuple[str, str | None], list[tuple[int, str]]] = {}
 
     def walk(self) -> None:
@@ -38,6 +41,7 @@ class StageWalker:
         for prim in self._leaves(context.stage.GetPseudoRoot(), _STAGE_PRIMS):
             matrix = context.local_to_world(prim)
             self._place(prim, matrix[None], [str(prim.GetPath())], inside=())
+        self._lights.add_to_scene()
 
     def _leaves(self, root: Usd.Prim, predicate) -> Iterator[Usd.Prim]:
         """Geometry, lights and PointInstancers under (and at) root that are visible and of a wanted purpose."""
@@ -87,12 +91,10 @@ class StageWalker:
         if prim.IsA(UsdGeom.PointInstancer):
             self._place_instancer(prim, matrices, paths, inside)
         elif prim.IsA(UsdGeom.Gprim):
-            if is_light(prim):
-                self._context.warn(prim.GetPath(), "geometry as a light (MeshLightAPI) is not supported. It is dark.")
-            self._place_geometry(prim, matrices, paths)
+            self._place_geometry(prim, matrices, paths, inside)
         elif is_light(prim):
             for matrix, path in zip(matrices, paths, strict=True):
-                add_light(self._context, self._scene, prim, matrix, path)
+                self._lights.read(prim, matrix, path)
         else:
             self._warn_of_type(prim)
 
@@ -101,7 +103,7 @@ class StageWalker:
 
     # -- geometry
 
-    def _place_geometry(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str]) -> None:
+    def _place_geometry(self, prim: Usd.Prim, matrices: np.ndarray, paths: list[str], inside: tuple[str, ...]) -> None:
         kind = prim.GetTypeName()
         if not (prim.IsA(UsdGeom.Mesh) or kind in _GPRIMS):
             self._warn_of_type(prim)
@@ -120,7 +122,12 @@ class StageWalker:
                 continue
             for mesh, subset in parts:
                 name = f"{path}/{subset}" if subset else path
-                self._scene.add_object(name, mesh, materials[subset].index, np.ascontiguousarray(matrix))
+                matrix = np.ascontiguousarray(matrix)
+                index = self._scene.add_object(name, mesh, materials[subset].index, matrix)
+                own = [prim.GetPath().AppendChild(subset)] if subset else []
+                self._links.add_object([*own, prim.GetPath(), *reversed([Sdf.Path(name) for name in inside])])
+                if is_light(prim):
+                    self._lights.read_mesh(prim, matrix, name, index)
 
     def _mesh_parts(self, prim: Usd.Prim, texcoord_name: str | None) -> list[tuple[int, str]]:
         """Indices of the prim's meshes in the scene and the subsets that they belong to; read on first use."""

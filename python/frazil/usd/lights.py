@@ -1,23 +1,33 @@
-"""UsdLux lights: shapes, radiance, multipliers per component, light groups and dome images."""
+"""UsdLux lights: shapes, radiance, shaping, shadows, linking, multipliers per component and light groups."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdLux
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from .._frazil import CylinderLight, DiskLight, DistantLight, DomeLight, Light, RectLight, Scene, SphereLight
+from .._frazil import (
+    CylinderLight,
+    DiskLight,
+    DistantLight,
+    DomeLight,
+    Light,
+    MeshLight,
+    RectLight,
+    Scene,
+    ShadowRules,
+    Shaping,
+    SphereLight,
+)
 from .context import ReadContext, is_singular
-from .textures import decode_srgb, is_srgb, read_image, resolve
+from .light_images import read_light_image
+from .linking import LinkReader
 
 _GREY_DOME = 0.5
 
 # The dome of UsdLuxDomeLight_1 may stand on z: its own frame, pole +y, turned by 90 degrees about x.
 _POLE_Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
-
-# Shaping inputs and the values at which they do nothing.
-_SHAPING = {"shaping:focus": 0.0, "shaping:cone:angle": 90.0, "shaping:ies:file": None}
 
 
 def is_light(prim: Usd.Prim) -> bool:
@@ -25,31 +35,77 @@ def is_light(prim: Usd.Prim) -> bool:
     return prim.HasAPI(UsdLux.LightAPI)
 
 
-def add_light(context: ReadContext, scene: Scene, prim: Usd.Prim, matrix: np.ndarray, path: str) -> None:
-    """Add the prim's light, placed by `matrix` (its frame to the world); a warning where it cannot be used."""
-    kind = str(prim.GetTypeName())
-    shape = _read_shape(context, prim, kind)
-    if shape is None:
-        return
-    if is_singular(matrix):
-        context.warn(path, "its transform cannot be inverted (a scale of 0?). The light is left out.")
-        return
-    _warn_of_unsupported(context, prim)
-    radiance = _read_radiance(context, prim)
-    if not np.isfinite(radiance).all():
-        context.warn(path, f"intensity times color must be finite, got {radiance.tolist()}. The light is left out.")
-        return
-    if isinstance(shape, DomeLight | DistantLight):
-        matrix = _rotation_of(matrix)
-    if kind == "DomeLight_1":
-        pole = _get(context, prim, "poleAxis", "scene")
-        if pole == "Z" or (pole == "scene" and context.is_z_up):
-            matrix = _POLE_Y_TO_Z @ matrix
-    group = context.get(prim.GetAttribute("frazil:lightGroup")) or context.get(
-        prim.GetAttribute("inputs:frazil:lightGroup"), ""
-    )
-    scene.add_light(
-        Light(
+class LightReader:
+    """Reads lights while the stage is walked; they join the scene at the end, when all objects are known."""
+
+    def __init__(self, context: ReadContext, scene: Scene, links: LinkReader) -> None:
+        self._context = context
+        self._scene = scene
+        self._links = links
+        self._lights: list[tuple[Light, Usd.Prim | None]] = []
+        self._shining: set[int] = set()  # objects that a mesh light stands for
+
+    def read(self, prim: Usd.Prim, matrix: np.ndarray, path: str) -> None:
+        """The prim's light, placed by `matrix` (its frame to the world); a warning where it cannot be used."""
+        kind = str(prim.GetTypeName())
+        shape = _read_shape(self._context, prim, kind)
+        if shape is None:
+            return
+        if is_singular(matrix):
+            self._context.warn(path, "its transform cannot be inverted (a scale of 0?). The light is left out.")
+            return
+        if isinstance(shape, DomeLight | DistantLight):
+            matrix = _rotation_of(matrix)
+        if kind == "DomeLight_1":
+            pole = _get(self._context, prim, "poleAxis", "scene")
+            if pole == "Z" or (pole == "scene" and self._context.is_z_up):
+                matrix = _POLE_Y_TO_Z @ matrix
+        self._add(prim, shape, matrix, path)
+
+    def read_mesh(self, prim: Usd.Prim, matrix: np.ndarray, path: str, index: int) -> None:
+        """The light of a mesh (MeshLightAPI) that the scene shows as the object `index`."""
+        self._shining.add(index)
+        factors = None
+        if _get(self._context, prim, "light:materialSyncMode", "materialGlowTintsLight") == "materialGlowTintsLight":
+            factors = self._scene.triangle_emission(index)
+        mesh = self._scene.mesh(self._scene.objects[index].mesh)
+        if not len(mesh.triangles):
+            return
+        is_two_sided = bool(self._context.get(UsdGeom.Gprim(prim).GetDoubleSidedAttr(), False))
+        self._add(prim, MeshLight(mesh, index, factors, is_two_sided=is_two_sided), matrix, path)
+
+    def add_to_scene(self) -> None:
+        """Add what was read, linked, and a mesh light for every object whose material emits light."""
+        for light, prim in self._lights:
+            light.lit = self._links.lit_by(prim)
+            casters = self._links.casters_of(prim)
+            if casters is not None:
+                light.shadow = light.shadow.with_casters(casters)
+            self._scene.add_light(light)
+        for index in self._scene.emissive_objects():
+            if index in self._shining:
+                continue
+            item = self._scene.objects[index]
+            shape = MeshLight(
+                self._scene.mesh(item.mesh),
+                index,
+                self._scene.triangle_emission(index),
+                is_two_sided=True,
+                is_material=True,
+            )
+            self._scene.add_light(Light(shape, matrix=item.matrix, path=item.path))
+
+    def _add(self, prim: Usd.Prim, shape, matrix: np.ndarray, path: str) -> None:
+        context = self._context
+        _warn_of_unsupported(context, prim)
+        radiance = _read_radiance(context, prim)
+        if not np.isfinite(radiance).all():
+            context.warn(path, f"intensity times color must be finite, got {radiance.tolist()}. The light is left out.")
+            return
+        group = context.get(prim.GetAttribute("frazil:lightGroup")) or context.get(
+            prim.GetAttribute("inputs:frazil:lightGroup"), ""
+        )
+        light = Light(
             shape,
             radiance=radiance.tolist(),
             matrix=np.ascontiguousarray(matrix),
@@ -61,8 +117,10 @@ def add_light(context: ReadContext, scene: Scene, prim: Usd.Prim, matrix: np.nda
             translucency=_number(context, prim, "frazil:translucency", 1.0),
             refraction=_number(context, prim, "frazil:refraction", 1.0),
             volume=_number(context, prim, "frazil:volume", 1.0),
+            shaping=_read_shaping(context, prim),
+            shadow=_read_shadow(context, prim),
         )
-    )
+        self._lights.append((light, prim))
 
 
 def add_grey_dome(context: ReadContext, scene: Scene) -> None:
@@ -72,7 +130,7 @@ def add_grey_dome(context: ReadContext, scene: Scene) -> None:
 
 
 def _get(context: ReadContext, prim: Usd.Prim, name: str, default):
-    """An input: inputs:NAME, or NAME alone as before USD 21.02."""
+    """An input: inputs:NAME, or NAME alone as before USD 21.02 (and as some still are)."""
     attribute, older = prim.GetAttribute(f"inputs:{name}"), prim.GetAttribute(name)
     if not (attribute and attribute.HasAuthoredValue()) and older and older.HasAuthoredValue():
         attribute = older
@@ -111,38 +169,69 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
             context.warn(prim.GetPath(), f"{name} must be > 0, got {value}. The light is left out.")
             return None
     if kind == "RectLight":
-        if _get(context, prim, "texture:file", Sdf.AssetPath()).path:
-            context.warn(prim.GetPath(), "textures on rect lights are not supported. It shines evenly.")
-        return RectLight(*values)
+        return RectLight(*values, _read_image(context, prim, "It shines evenly."), str(prim.GetPath()))
     return {"DiskLight": DiskLight, "SphereLight": SphereLight, "CylinderLight": CylinderLight}[kind](*values)
 
 
-def _read_dome(context: ReadContext, prim: Usd.Prim) -> DomeLight:
+def _read_image(context: ReadContext, prim: Usd.Prim, instead: str) -> np.ndarray | None:
     asset = _get(context, prim, "texture:file", None)
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
-        return DomeLight()
+        return None
+    attribute = prim.GetAttribute("inputs:texture:file") or prim.GetAttribute("texture:file")
+    return read_light_image(context, prim, attribute, asset, instead)
+
+
+def _read_dome(context: ReadContext, prim: Usd.Prim) -> DomeLight:
     layout = str(_get(context, prim, "texture:format", "automatic"))
     if layout not in ("automatic", "latlong"):
         context.warn(prim.GetPath(), f"dome images must be latlong, got '{layout}'. A uniform dome is used.")
         return DomeLight()
-    try:
-        attribute = prim.GetAttribute("inputs:texture:file") or prim.GetAttribute("texture:file")
-        path = resolve(context, asset, attribute)
-        if not path:
-            raise OSError(f"@{asset.path}@ cannot be found.")
-        pixels, is_8_bit = read_image(path)
-    except OSError as error:
-        context.warn(prim.GetPath(), f"{error} A uniform dome is used.")
-        return DomeLight()
-    color_space = (attribute.GetColorSpace() or "auto") if attribute else "auto"
-    pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    if is_srgb(color_space, is_8_bit, 3):
-        pixels = decode_srgb(pixels)
-    is_good = np.isfinite(pixels)
-    if not is_good.all():
-        context.warn(prim.GetPath(), f"{path} has {int((~is_good).sum())} NaN or infinite values. They are taken as 0.")
-        pixels = np.where(is_good, pixels, 0.0)
-    return DomeLight(np.ascontiguousarray(pixels, dtype=np.float32), str(prim.GetPath()))
+    pixels = _read_image(context, prim, "A uniform dome is used.")
+    return DomeLight() if pixels is None else DomeLight(pixels, str(prim.GetPath()))
+
+
+def _read_shaping(context: ReadContext, prim: Usd.Prim) -> Shaping:
+    if not prim.HasAPI(UsdLux.ShapingAPI):
+        return Shaping()
+    names = ("shaping:cone:angle", "shaping:cone:softness")
+    has_cone = any(prim.GetAttribute(f"inputs:{name}").HasAuthoredValue() for name in names)
+    return Shaping(
+        cone_angle=_within(context, prim, "shaping:cone:angle", 90.0, 0.0, 180.0) if has_cone else 180.0,
+        cone_softness=_within(context, prim, "shaping:cone:softness", 0.0, 0.0, math.inf),
+        focus=_within(context, prim, "shaping:focus", 0.0, 0.0, math.inf),
+        focus_tint=_color(context, prim, "shaping:focusTint"),
+    )
+
+
+def _read_shadow(context: ReadContext, prim: Usd.Prim) -> ShadowRules:
+    if not prim.HasAPI(UsdLux.ShadowAPI):
+        return ShadowRules()
+    scale = context.meters_per_unit
+    return ShadowRules(
+        is_enabled=bool(_get(context, prim, "shadow:enable", True)),
+        color=_color(context, prim, "shadow:color"),
+        distance=_number(context, prim, "shadow:distance", -1.0) * scale,
+        falloff=_number(context, prim, "shadow:falloff", -1.0) * scale,
+        falloff_gamma=_within(context, prim, "shadow:falloffGamma", 1.0, 1e-6, math.inf),
+    )
+
+
+def _within(context: ReadContext, prim: Usd.Prim, name: str, default: float, low: float, high: float) -> float:
+    value = _number(context, prim, name, default)
+    if low <= value <= high:
+        return value
+    rule = f"in {low:g}..{high:g}" if math.isfinite(high) else f">= {low:g}"
+    nearest = min(max(value, low), high)
+    context.warn(prim.GetPath(), f"{name} must be {rule}, got {value:g}. {nearest:g} is used.")
+    return nearest
+
+
+def _color(context: ReadContext, prim: Usd.Prim, name: str) -> list[float]:
+    value = [float(x) for x in _get(context, prim, name, (0, 0, 0))]
+    if all(map(math.isfinite, value)):
+        return value
+    context.warn(prim.GetPath(), f"{name} must be finite, got {value}. Black is used.")
+    return [0.0, 0.0, 0.0]
 
 
 def _read_radiance(context: ReadContext, prim: Usd.Prim) -> np.ndarray:
@@ -166,20 +255,12 @@ def _rotation_of(matrix: np.ndarray) -> np.ndarray:
 
 def _warn_of_unsupported(context: ReadContext, prim: Usd.Prim) -> None:
     path = prim.GetPath()
-    for name, neutral in _SHAPING.items():
-        attribute = prim.GetAttribute(f"inputs:{name}")
-        if attribute and attribute.HasAuthoredValue() and context.get(attribute) != neutral:
-            if name == "shaping:cone:angle" and context.get(attribute) >= 90.0:
-                continue
-            context.warn(path, f"inputs:{name} is not supported. The light shines unshaped.", once="shaping")
+    profile = context.get(prim.GetAttribute("inputs:shaping:ies:file"))
+    if profile is not None and profile.path:
+        context.warn(path, "IES profiles are not supported. The light shines without it.")
     filters = prim.GetRelationship("light:filters")
     if filters and filters.GetTargets():
         context.warn(path, "light filters are not supported. They are left out.")
-    for collection in ("lightLink", "shadowLink"):
-        for relation in ("includes", "excludes"):
-            relationship = prim.GetRelationship(f"collection:{collection}:{relation}")
-            if relationship and relationship.GetTargets():
-                context.warn(path, f"{collection} is not supported. The light reaches everything.", once=collection)
-    enable = prim.GetAttribute("inputs:shadow:enable")
-    if enable and context.get(enable) is False:
-        context.warn(path, "inputs:shadow:enable = false is not supported. The light casts shadows.")
+    portals = prim.GetRelationship("portals")
+    if portals and portals.GetTargets():
+        context.warn(path, "portals are not supported. The dome shines from everywhere.")

@@ -3,6 +3,7 @@
 #include <nanobind/stl/variant.h>
 
 #include "frazil/bindings/bindings.h"
+#include "frazil/render/emission.h"
 #include "frazil/render/scene.h"
 
 namespace frazil {
@@ -22,14 +23,11 @@ nb::object from_matrix(const M44f& matrix) {
     return nb::cast(nb::ndarray<nb::numpy, double>(values, {4, 4}, owner));
 }
 
-namespace {
-
-using Triple = std::array<float, 3>;
-using ImageArray = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
-
 M44f to_matrix_or_identity(const std::optional<MatrixArray>& array) {
     return array ? to_matrix(*array) : M44f();
 }
+
+namespace {
 
 std::uint32_t check_index(int index, std::size_t size, const std::string& path, const char* what) {
     if (index < 0 || std::size_t(index) >= size) {
@@ -37,106 +35,6 @@ std::uint32_t check_index(int index, std::size_t size, const std::string& path, 
                              ". Use an index that add_", what, " gave."));
     }
     return std::uint32_t(index);
-}
-
-void bind_lights(nb::module_& module) {
-    nb::class_<DomeLight>(
-        module, "DomeLight",
-        "Light from all around.\n\n"
-        "Parameters\n----------\n"
-        "image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a\n"
-        "    uniform dome. Copied.")
-        .def(
-            "__init__",
-            [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path) {
-                if (!image) {
-                    new (self) DomeLight{};
-                    return;
-                }
-                const auto* pixels = reinterpret_cast<const Rgb*>(image->data());
-                new (self) DomeLight{std::make_shared<const Environment>(
-                    int(image->shape(1)), int(image->shape(0)),
-                    std::vector<Rgb>(pixels, pixels + image->shape(0) * image->shape(1)), path)};
-            },
-            "image"_a = nb::none(), "path"_a = "DomeLight")
-        .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
-        .def(
-            "radiance",
-            [](const DomeLight& light, const Triple& direction) {
-                const Rgb c = light.image ? light.image->eval(V3f(direction[0], direction[1], direction[2])) : Rgb(1);
-                return Triple{c.x, c.y, c.z};
-            },
-            "direction"_a, "Radiance from a unit direction in the light's own frame; 1 without an image.");
-    nb::class_<DistantLight>(module, "DistantLight", "A sun along -z; `angle` is its full angle in degrees.")
-        .def(nb::init<float>(), "angle"_a = 0.53f)
-        .def_rw("angle", &DistantLight::angle);
-    nb::class_<RectLight>(module, "RectLight", "A rectangle in x and y that shines along -z, in the light's units.")
-        .def(nb::init<float, float>(), "width"_a = 1.0f, "height"_a = 1.0f)
-        .def_rw("width", &RectLight::width)
-        .def_rw("height", &RectLight::height);
-    nb::class_<DiskLight>(module, "DiskLight", "A disk in x and y that shines along -z, in the light's units.")
-        .def(nb::init<float>(), "radius"_a = 0.5f)
-        .def_rw("radius", &DiskLight::radius);
-    nb::class_<SphereLight>(module, "SphereLight", "A sphere that shines outwards, in the light's units.")
-        .def(nb::init<float>(), "radius"_a = 0.5f)
-        .def_rw("radius", &SphereLight::radius);
-    nb::class_<CylinderLight>(module, "CylinderLight",
-                              "A tube about x without caps that shines outwards, in the light's units.")
-        .def(nb::init<float, float>(), "length"_a = 1.0f, "radius"_a = 0.5f)
-        .def_rw("length", &CylinderLight::length)
-        .def_rw("radius", &CylinderLight::radius);
-
-    nb::class_<Light>(
-        module, "Light",
-        "A light of the scene.\n\n"
-        "Parameters\n----------\n"
-        "shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight or CylinderLight.\n"
-        "radiance : RGB, the product of intensity, exposure, colour and colour temperature.\n"
-        "matrix : (4, 4) float64 light to world, for row vectors; None = identity.\n"
-        "path : name for messages. group : light group, '' = the default one.\n"
-        "normalize : divide by the light's area in square metres.\n"
-        "diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.")
-        .def(
-            "__init__",
-            [](Light* self, LightShape shape, const Triple& radiance, const std::optional<MatrixArray>& matrix,
-               const std::string& path, const std::string& group, bool normalize, float diffuse, float specular,
-               float translucency, float refraction, float volume) {
-                new (self) Light{path,
-                                 group,
-                                 std::move(shape),
-                                 Rgb(radiance[0], radiance[1], radiance[2]),
-                                 normalize,
-                                 to_matrix_or_identity(matrix),
-                                 {diffuse, specular, translucency, refraction, volume}};
-            },
-            "shape"_a, nb::kw_only(), "radiance"_a = Triple{1, 1, 1}, "matrix"_a = nb::none(), "path"_a = "Light",
-            "group"_a = "", "normalize"_a = false, "diffuse"_a = 1.0f, "specular"_a = 1.0f, "translucency"_a = 1.0f,
-            "refraction"_a = 1.0f, "volume"_a = 1.0f)
-        .def_rw("path", &Light::path)
-        .def_rw("group", &Light::group)
-        .def_rw("shape", &Light::shape)
-        .def_prop_rw(
-            "radiance",
-            [](const Light& light) {
-                return Triple{light.radiance.x, light.radiance.y, light.radiance.z};
-            },
-            [](Light& light, const Triple& value) { light.radiance = Rgb(value[0], value[1], value[2]); })
-        .def_rw("normalize", &Light::normalize)
-        .def_prop_rw(
-            "matrix", [](const Light& light) { return from_matrix(light.light_to_world); },
-            [](Light& light, const MatrixArray& matrix) { light.light_to_world = to_matrix(matrix); })
-        .def_prop_ro("diffuse", [](const Light& light) { return light.multipliers[int(LightComponent::diffuse)]; })
-        .def_prop_ro("specular", [](const Light& light) { return light.multipliers[int(LightComponent::specular)]; })
-        .def_prop_ro("translucency",
-                     [](const Light& light) { return light.multipliers[int(LightComponent::translucency)]; })
-        .def_prop_ro("refraction",
-                     [](const Light& light) { return light.multipliers[int(LightComponent::refraction)]; })
-        .def_prop_ro("volume", [](const Light& light) { return light.multipliers[int(LightComponent::volume)]; })
-        .def("__repr__", [](const Light& light) {
-            constexpr const char* kShapes[] = {"dome", "distant", "rect", "disk", "sphere", "cylinder"};
-            return str("Light(", light.path, ", ", kShapes[light.shape.index()], ", radiance=(", light.radiance.x, ", ",
-                       light.radiance.y, ", ", light.radiance.z, "))");
-        });
 }
 
 void bind_camera(nb::module_& module) {
@@ -193,7 +91,6 @@ void bind_camera(nb::module_& module) {
 }  // namespace
 
 void bind_scene(nb::module_& module) {
-    bind_lights(module);
     bind_camera(module);
 
     nb::class_<Material>(module, "Material", "A named model of the scene.")
@@ -248,6 +145,19 @@ void bind_scene(nb::module_& module) {
                 return int(scene.lights.size()) - 1;
             },
             "light"_a, "Add a light (copied); its index.")
+        .def("emissive_objects", &emissive_objects, "Indices of the objects whose material emits light.")
+        .def(
+            "triangle_emission",
+            [](const Scene& scene, int index) -> nb::object {
+                const std::uint32_t object = check_index(index, scene.objects.size(), "Scene", "object");
+                const std::vector<Rgb> values = triangle_emission(scene, object);
+                if (values.empty()) return nb::none();
+                auto* memory = new std::vector<Rgb>(values);
+                nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<Rgb>*>(p); });
+                return nb::cast(nb::ndarray<nb::numpy, float>(memory->data(), {memory->size(), 3}, owner));
+            },
+            "object"_a, nb::sig("def triangle_emission(self, object: int) -> numpy.ndarray | None"),
+            "Mean radiance (F, 3) float32 that the material of an object emits, by triangle; None where it emits none.")
         .def_rw("camera", &Scene::camera)
         .def_ro("meshes", &Scene::meshes, "Copies of the meshes, in the order of their indices.")
         .def(

@@ -44,6 +44,7 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
 // A (4, 4) float64 matrix for row vectors, as USD's GfMatrix4d and Imath have it.
 using MatrixArray = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 M44f to_matrix(const MatrixArray& array);
+M44f to_matrix_or_identity(const std::optional<MatrixArray>& array);
 nb::object from_matrix(const M44f& matrix);
 
 // ValueError for any other name.
@@ -54,6 +55,7 @@ void bind_material(nb::module_& module);
 void bind_points(nb::module_& module);
 void bind_translucency(nb::module_& module);
 void bind_lighting(nb::module_& module);
+void bind_lights(nb::module_& module);
 void bind_scene(nb::module_& module);
 void bind_render(nb::module_& module);
 

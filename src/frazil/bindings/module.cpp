@@ -47,6 +47,7 @@ NB_MODULE(_frazil, module) {
     bind_geometry(module);
     bind_points(module);
     bind_translucency(module);
+    bind_lights(module);
     bind_lighting(module);
     bind_material(module);
     bind_scene(module);

@@ -28,7 +28,12 @@ RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
 
 RTCScene make_scene() {
     RTCScene scene = rtcNewScene(embree_device());
+#if FRAZIL_EMBREE_MAJOR >= 4
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+#else
+    // Embree 3 must know that a query may bring a filter.
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+#endif
     return scene;
 }
 
@@ -51,6 +56,7 @@ struct RayScene::Impl {
     std::vector<std::uint32_t> placement_of_geometry;
     std::vector<M44f> world_to_local;       // by placement; for the normals of instances
     std::vector<std::uint8_t> is_mirrored;  // by placement; baked vertices then wind the other way
+    std::vector<Passage> passages;          // by placement; empty = none
 
     Impl() = default;
     Impl(const Impl&) = delete;
@@ -68,7 +74,63 @@ struct RayScene::Impl {
         if (placement_of_geometry.size() <= id) placement_of_geometry.resize(id + 1);
         placement_of_geometry[id] = placement;
     }
+
+    std::uint32_t placement_of(unsigned geometry, unsigned instance) const {
+        return placement_of_geometry[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
+    }
+
+    Hit to_hit(const RTCRayHit& query) const {
+        const bool is_instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+        Hit hit;
+        hit.t = query.ray.tfar;
+        hit.placement = placement_of(query.hit.geomID, query.hit.instID[0]);
+        hit.triangle = query.hit.primID;
+        hit.uv = {query.hit.u, query.hit.v};
+        const V3f normal(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
+        if (is_instance) {
+            hit.geometric_normal = transform_normal(normal, world_to_local[hit.placement]);
+        } else {
+            hit.geometric_normal = normal.normalized() * (is_mirrored[hit.placement] ? -1.0f : 1.0f);
+        }
+        return hit;
+    }
 };
+
+namespace {
+
+// An Embree query that sees some of the placements.
+struct FilteredContext {
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCRayQueryContext embree;  // first: Embree hands its address back
+#else
+    RTCIntersectContext embree;
+#endif
+    const std::vector<std::uint32_t>* placement_of_geometry;
+    PlacementMask mask;
+
+    FilteredContext(const std::vector<std::uint32_t>& placements, PlacementMask wanted)
+        : placement_of_geometry(&placements), mask(wanted) {
+#if FRAZIL_EMBREE_MAJOR >= 4
+        rtcInitRayQueryContext(&embree);
+#else
+        rtcInitIntersectContext(&embree);
+        embree.filter = &reject_unmasked;
+#endif
+    }
+
+    // Single rays alone: N is 1.
+    static void reject_unmasked(const RTCFilterFunctionNArguments* arguments) {
+        const auto* self = reinterpret_cast<const FilteredContext*>(arguments->context);
+        if (arguments->valid[0] != -1) return;
+        const unsigned instance = RTCHitN_instID(arguments->hit, 1, 0, 0);
+        const unsigned geometry = RTCHitN_geomID(arguments->hit, 1, 0);
+        const std::uint32_t placement =
+            (*self->placement_of_geometry)[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
+        if (placement >= self->mask->size() || !(*self->mask)[placement]) arguments->valid[0] = 0;
+    }
+};
+
+}  // namespace
 
 RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>& placements)
     : impl_(std::make_unique<Impl>()) {
@@ -127,18 +189,56 @@ bool RayScene::intersect(const Ray& ray, Hit& hit) const {
 #endif
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
 
-    const bool is_instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
-    hit.t = query.ray.tfar;
-    hit.placement = impl_->placement_of_geometry[is_instance ? query.hit.instID[0] : query.hit.geomID];
-    hit.triangle = query.hit.primID;
-    hit.uv = {query.hit.u, query.hit.v};
-    const V3f normal(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
-    if (is_instance) {
-        hit.geometric_normal = transform_normal(normal, impl_->world_to_local[hit.placement]);
-    } else {
-        hit.geometric_normal = normal.normalized() * (impl_->is_mirrored[hit.placement] ? -1.0f : 1.0f);
-    }
+    hit = impl_->to_hit(query);
     return true;
+}
+
+bool RayScene::intersect(const Ray& ray, Hit& hit, PlacementMask mask) const {
+    if (!mask) return intersect(ray, hit);
+    RTCRayHit query;
+    set_ray(ray, query.ray);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    FilteredContext context(impl_->placement_of_geometry, mask);
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.context = &context.embree;
+    arguments.filter = &FilteredContext::reject_unmasked;
+    arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    rtcIntersect1(impl_->top, &query, &arguments);
+#else
+    rtcIntersect1(impl_->top, &context.embree, &query);
+#endif
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    hit = impl_->to_hit(query);
+    return true;
+}
+
+bool RayScene::is_occluded(const Ray& ray, PlacementMask mask) const {
+    if (!mask) return is_occluded(ray);
+    RTCRay query;
+    set_ray(ray, query);
+    FilteredContext context(impl_->placement_of_geometry, mask);
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCOccludedArguments arguments;
+    rtcInitOccludedArguments(&arguments);
+    arguments.context = &context.embree;
+    arguments.filter = &FilteredContext::reject_unmasked;
+    arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    rtcOccluded1(impl_->top, &query, &arguments);
+#else
+    rtcOccluded1(impl_->top, &context.embree, &query);
+#endif
+    return query.tfar < 0.0f;
+}
+
+void RayScene::set_passages(std::vector<Passage> passages) {
+    impl_->passages = std::move(passages);
+}
+
+const std::vector<Passage>& RayScene::passages() const {
+    return impl_->passages;
 }
 
 bool RayScene::is_occluded(const Ray& ray) const {

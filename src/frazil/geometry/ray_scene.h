@@ -2,7 +2,8 @@
 // Model: a mesh that is placed once is traced in world space; one that is placed often is an Embree instance. Nested
 //   instances arrive flattened: one placement per leaf.
 // Units: metres, world space. Directions need not be unit length; t counts in their length.
-// Valid: thread-safe after construction. Robust (watertight) traversal.
+// Valid: thread-safe after construction. Robust (watertight) traversal. Questions about some of the placements alone go
+//   through an Embree filter; the others do not pay for it.
 // Not: curves, volumes, motion blur.
 #pragma once
 
@@ -38,6 +39,16 @@ struct Placement {
     M44f local_to_world;
 };
 
+// What a placement does to light that goes straight through it.
+struct Passage {
+    bool is_open = false;         // false: it stops all light
+    float eta = 1.0f;             // of its inside, relative to the outside
+    Rgb attenuation = Rgb(0.0f);  // 1/m, inside
+};
+
+// Placements that a ray may meet, one byte each (beyond the end: 0); null = all.
+using PlacementMask = const std::vector<std::uint8_t>*;
+
 class RayScene {
   public:
     // The meshes may go after construction. An empty scene is allowed: every ray misses.
@@ -52,6 +63,15 @@ class RayScene {
     bool is_occluded(const Ray& ray) const;
     // The same for many rays at once; faster where rays that follow one another are alike. out[i] is 1 or 0.
     void are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const;
+
+    // The same among some of the placements.
+    bool intersect(const Ray& ray, Hit& hit, PlacementMask mask) const;
+    bool is_occluded(const Ray& ray, PlacementMask mask) const;
+
+    // What each placement does to light that goes straight through it. Empty (as constructed): all are opaque. Rays do not
+    // heed it; lighting/shadow.h does.
+    void set_passages(std::vector<Passage> passages);
+    const std::vector<Passage>& passages() const;
 
   private:
     struct Impl;

@@ -79,6 +79,7 @@ BounceRadiance reflected_light(const RayScene& scene, const LightSampler& lights
                                                                         std::span<Rgb> radiance) {
         // The surfaces that reflect become points of their own, on the side that is seen.
         PointSet lit;
+        IrradianceOptions options;
         std::vector<std::size_t> index;
         std::vector<Rgb> share;
         for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -87,12 +88,15 @@ BounceRadiance reflected_light(const RayScene& scene, const LightSampler& lights
             const V3f& normal = hits[i].surface.geometric_normal;
             lit.positions.push_back(hits[i].position);
             lit.normals.push_back(normal.dot(hits[i].direction) > 0.0f ? -normal : normal);
+            options.objects.push_back(hits[i].surface.placement);
             index.push_back(i);
             share.push_back(a * kInvPi);
         }
         if (index.empty()) return;
         // Another seed for every batch: its first point tells it apart.
-        const IrradianceOptions options{samples, hash(seed, hits.front().point), LightComponent::diffuse};
+        options.samples = samples;
+        options.seed = hash(seed, hits.front().point);
+        options.component = LightComponent::diffuse;
         const Irradiance direct = bake_irradiance(
             lit, scene, lights, [](float) { return 1.0f; }, options);
         for (std::size_t i = 0; i < index.size(); ++i) {

@@ -32,6 +32,9 @@ class Environment {
     float pdf(const V3f& direction) const;
     // Both at once, for the price of one.
     Rgb eval(const V3f& direction, float& pdf) const;
+    int width() const { return width_; }
+    int height() const { return height_; }
+    const std::vector<Rgb>& pixels() const { return pixels_; }
     // Mean radiance over the sphere.
     Rgb average() const { return average_; }
 

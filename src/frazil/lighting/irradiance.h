@@ -1,10 +1,13 @@
 // Irradiance at points: the light that enters a translucent body, baked once per shot.
 // Model: E = ∫ L(w) T(cos) cos dw over the outer hemisphere, per light group, with ray-traced shadows and the boundary's
 //   transmittance T; every light is served by its own stratified samples, quasi-Monte Carlo per point. Domes with an image
-//   share theirs between the image's density and the cosine by the balance heuristic.
+//   share theirs between the image's density and the cosine by the balance heuristic. A group's lights with a surface,
+//   where they are more than kCrowd, are a crowd: they share the samples of sixteen lights, each sample picks one
+//   (light_picker.h). Errors are estimated from neighbouring samples [Wolter1985], which tends to exceed them.
 // Units: W/m² (the lights' unit).
 // Valid: the same bits for any number of threads; seeded by (seed, point), so that a light's part does not depend on the
-//   other lights and a negative twin cancels to the bit. Lights whose translucency multiplier is 0 cost nothing.
+//   other lights and a negative twin cancels to the bit (outside crowds). Lights whose translucency multiplier is 0, or
+//   that are not linked to a point's object, cost nothing.
 // Not: bounces between surfaces (bounce.h).
 #pragma once
 
@@ -24,11 +27,21 @@ struct IrradianceOptions {
     int samples = 64;  // per point and light, 1 to 2^20; a power of two is stratified best
     std::uint32_t seed = 0;
     LightComponent component = LightComponent::translucency;  // whose multipliers the lights take
+    std::vector<std::uint32_t> objects =
+        {};  // that the points lie on, for light linking: one each, one for all, or none
+    // Relative error (one standard deviation) to reach by more samples, 0 = none. Relative to what arrives at the point,
+    // or to a tenth of what would arrive if nothing were in the way, whichever is larger.
+    float error = 0.0f;
+    int max_rounds = 16;  // how many times `samples` a light may take at a point for that
 };
+
+// So many lights of a group are served one by one in the bake.
+inline constexpr std::size_t kCrowd = 32;
 
 struct Irradiance {
     std::size_t groups = 1;
-    std::vector<Rgb> values;  // (N, groups)
+    std::vector<Rgb> values;    // (N, groups)
+    std::vector<float> errors;  // (N), one standard deviation of the luminance of all groups together, estimated
     std::uint64_t rays = 0;
     std::uint64_t dropped_samples = 0;  // non-finite
 };
@@ -38,7 +51,8 @@ struct Irradiance {
 std::vector<std::string> light_groups(const std::vector<Light>& lights);
 
 // `transmittance(cos)` is the fraction of light that enters at that angle: 1 - Fresnel, or a table for a rough
-// boundary. It is tabulated once, at steps of 1/1024 in cos. ValueError for samples < 1 or points without normals.
+// boundary. It is tabulated once, at steps of 1/1024 in cos. ValueError for options out of
+// range or points without normals.
 Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
                            const std::function<float(float)>& transmittance, const IrradianceOptions& options = {},
                            Progress* progress = nullptr);

@@ -13,10 +13,17 @@ void check_size(const Light& light, const char* field, float value) {
                          ". A light without a surface gives no light; enlarge it or remove it."));
 }
 
+// Whether two axes are equal and at right angles, to the precision of floats.
+bool is_round(const V3d& a, const V3d& b) {
+    const double length2 = a.dot(a);
+    return std::abs(b.dot(b) - length2) < 1e-6 * length2 && std::abs(a.dot(b)) < 1e-6 * length2;
+}
+
 // Area of the unit sphere times `radius` moved by the matrix: an ellipsoid. The integral over the unit sphere of
 // |det A| |A^-T n|, by the midpoint rule: exact for a sphere, spectral in azimuth.
 double ellipsoid_area(double radius, const M44f& m) {
     const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    if (is_round(x, y) && is_round(y, z) && is_round(z, x)) return 4.0 * kPiD * radius * radius * x.dot(x);
     const V3d yz = y.cross(z), zx = z.cross(x), xy = x.cross(y);
     constexpr int kPolar = 128, kAzimuths = 128;
     double sum = 0.0;
@@ -34,6 +41,9 @@ double ellipsoid_area(double radius, const M44f& m) {
 double cylinder_area(const CylinderLight& cylinder, const M44f& m) {
     const V3d axis = V3d(m[0][0], m[0][1], m[0][2]) * double(cylinder.length);
     const V3d y = V3d(m[1][0], m[1][1], m[1][2]), z = V3d(m[2][0], m[2][1], m[2][2]);
+    if (is_round(y, z) && std::abs(axis.dot(y)) + std::abs(axis.dot(z)) < 1e-6 * axis.length() * y.length()) {
+        return 2.0 * kPiD * double(cylinder.radius) * axis.length() * y.length();
+    }
     constexpr int kAzimuths = 4096;
     double sum = 0.0;
     for (int j = 0; j < kAzimuths; ++j) {
@@ -60,6 +70,7 @@ struct SizeFactor {
     double operator()(const DiskLight& disk) const { return kPiD * disk.radius * disk.radius * cross_area(m); }
     double operator()(const SphereLight& sphere) const { return ellipsoid_area(sphere.radius, m); }
     double operator()(const CylinderLight& cylinder) const { return cylinder_area(cylinder, m); }
+    double operator()(const MeshLight& mesh) const { return surface_area(transformed(*mesh.mesh, m)); }
 };
 
 struct CheckShape {
@@ -79,7 +90,44 @@ struct CheckShape {
         check_size(light, "length", cylinder.length);
         check_size(light, "radius", cylinder.radius);
     }
+    void operator()(const MeshLight& mesh) const {
+        if (!mesh.mesh) throw ValueError(str(light.path, ": mesh must be given. Use the mesh that shines."));
+        check_mesh(*mesh.mesh, light.path);
+        if (!mesh.triangle_factors) return;
+        if (mesh.triangle_factors->size() != mesh.mesh->triangle_count()) {
+            throw ValueError(str(light.path, ": triangle_factors must be one per triangle (",
+                                 mesh.mesh->triangle_count(), "), got ", mesh.triangle_factors->size(), "."));
+        }
+        for (const Rgb& factor : *mesh.triangle_factors) {
+            if (is_finite(factor)) continue;
+            throw ValueError(str(light.path, ": triangle_factors must be finite, got (", factor.x, ", ", factor.y, ", ",
+                                 factor.z, ")."));
+        }
+    }
 };
+
+void require(const Light& light, bool holds, const char* rule, float value) {
+    if (!holds) throw ValueError(str(light.path, ": ", rule, ", got ", value, "."));
+}
+
+void check_shaping(const Light& light) {
+    const Shaping& s = light.shaping;
+    require(light, s.cone_angle >= 0.0f && s.cone_angle <= 180.0f, "shaping:cone:angle must be in [0, 180] degrees",
+            s.cone_angle);
+    require(light, s.cone_softness >= 0.0f && std::isfinite(s.cone_softness),
+            "shaping:cone:softness must be >= 0 and finite", s.cone_softness);
+    require(light, s.focus >= 0.0f && std::isfinite(s.focus), "shaping:focus must be >= 0 and finite", s.focus);
+    require(light, is_finite(s.focus_tint), "shaping:focusTint must be finite", s.focus_tint.x);
+}
+
+void check_shadow(const Light& light) {
+    const ShadowRules& s = light.shadow;
+    require(light, is_finite(s.color), "shadow:color must be finite", s.color.x);
+    require(light, !std::isnan(s.distance), "shadow:distance must be a number", s.distance);
+    require(light, !std::isnan(s.falloff), "shadow:falloff must be a number", s.falloff);
+    require(light, s.falloff_gamma > 0.0f && std::isfinite(s.falloff_gamma),
+            "shadow:falloffGamma must be > 0 and finite", s.falloff_gamma);
+}
 
 }  // namespace
 
@@ -100,6 +148,8 @@ void check_light(const Light& light) {
             }
         }
     }
+    check_shaping(light);
+    check_shadow(light);
     std::visit(CheckShape{light}, light.shape);
     const M44f& m = light.light_to_world;
     const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);

@@ -1,48 +1,85 @@
 #include "frazil/lighting/light_sampling.h"
 
+#include <algorithm>
+
 namespace frazil {
 namespace {
 
-std::vector<WorldLight> to_world(const std::vector<Light>& lights) {
-    std::vector<WorldLight> result;
-    result.reserve(lights.size());
-    for (const Light& light : lights) result.emplace_back(light);
-    return result;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// What a light's power counts for a use.
+float use_scale(const Light& light, LightUse use) {
+    const auto of = [&](LightComponent component) { return std::abs(light.multipliers[int(component)]); };
+    switch (use) {
+        case LightUse::surface:
+            return std::max(of(LightComponent::diffuse), of(LightComponent::specular));
+        case LightUse::translucency:
+            return of(LightComponent::translucency);
+        case LightUse::refraction:
+            return of(LightComponent::refraction);
+        case LightUse::volume:
+            return of(LightComponent::volume);
+    }
+    return 0.0f;
+}
+
+bool is_plain(const ShadowRules& shadow) {
+    return shadow.is_enabled && shadow.color == Rgb(0.0f) && !(shadow.distance >= 0.0f) && !shadow.casters;
 }
 
 }  // namespace
 
-LightSampler::LightSampler(const std::vector<Light>& lights)
-    : lights_(lights), world_lights_(std::make_shared<const std::vector<WorldLight>>(to_world(lights))) {}
-
-float LightSampler::pick_weight(std::size_t light, const V3f& position) const {
-    const float* multipliers = lights_[light].multipliers;
-    const float scale = std::max(std::abs(multipliers[int(LightComponent::diffuse)]),
-                                 std::abs(multipliers[int(LightComponent::specular)]));
-    return scale == 0.0f ? 0.0f : scale * (*world_lights_)[light].importance(position);
-}
-
-float LightSampler::pick_total(const V3f& position) const {
-    float total = 0.0f;
-    for (std::size_t i = 0; i < lights_.size(); ++i) total += pick_weight(i, position);
-    return total;
-}
-
-LightSample LightSampler::sample(const V3f& position, float u_pick, const V2f& u) const {
-    const float total = pick_total(position);
-    if (!(total > 0.0f)) return {};
-    float left = u_pick * total;
-    int picked = -1;
-    float weight = 0.0f;
-    for (std::size_t i = 0; i < lights_.size(); ++i) {
-        const float w = pick_weight(i, position);
-        if (w == 0.0f) continue;
-        picked = int(i), weight = w;
-        if (left < w) break;
-        left -= w;
+LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
+    const auto world = std::make_shared<World>();
+    world->lights.reserve(lights.size());
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const Light& light = lights[i];
+        world->lights.emplace_back(light);
+        world->link_of_light.push_back(world->table.add(light.lit));
+        world->casters_of_light.push_back(world->table.add(light.shadow.casters));
+        world->is_plain.push_back(is_plain(light.shadow));
+        const auto* mesh = std::get_if<MeshLight>(&light.shape);
+        if (!world->is_plain.back() && !mesh) world->odd_shadows.push_back(int(i));
+        if (mesh && mesh->object != kNoObject) {
+            if (world->light_of_object.size() <= mesh->object) world->light_of_object.resize(mesh->object + 1, -1);
+            world->light_of_object[mesh->object] = int(i);
+        }
     }
-    LightSample sample = sample_one(picked, position, u);
-    sample.pdf *= weight / total;
+
+    // Uses that weigh the lights alike share a picker.
+    std::vector<std::pair<std::vector<float>, std::shared_ptr<const LightPicker>>> made;
+    const auto picker_by = [&](const auto& scale_of) {
+        std::vector<float> scales;
+        for (const Light& light : lights) scales.push_back(scale_of(light));
+        for (const auto& [known, picker] : made) {
+            if (known == scales) return picker;
+        }
+        std::vector<PickEntry> entries;
+        for (std::size_t i = 0; i < scales.size(); ++i) {
+            if (scales[i] > 0.0f) entries.push_back({int(i), scales[i]});
+        }
+        made.emplace_back(
+            scales, std::make_shared<const LightPicker>(world->lights, entries, world->table, world->link_of_light));
+        return made.back().second;
+    };
+    world->all = picker_by([](const Light&) { return 1.0f; });
+    for (std::size_t use = 0; use < kLightUseCount; ++use) {
+        world->pickers[use] = picker_by([&](const Light& light) { return use_scale(light, LightUse(use)); });
+    }
+    world_ = world;
+}
+
+LightPick LightSampler::pick(const LightReceiver& receiver, float u, LightUse use) const {
+    thread_local LightPicker::Weights weights;
+    picker(use).weigh(receiver, weights);
+    return picker(use).pick(receiver, weights, u);
+}
+
+LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, LightUse use) const {
+    const LightPick picked = pick(receiver, u_pick, use);
+    if (picked.light < 0) return {};
+    LightSample sample = sample_one(picked.light, receiver.position, u);
+    sample.pdf *= picked.probability;
     return sample;
 }
 
@@ -58,21 +95,50 @@ void LightSampler::sample_many(int light, const V3f& position, std::span<const V
     for (LightSample& sample : out) sample.light = light;
 }
 
-void LightSampler::intersect(const V3f& origin, const V3f& direction, float t_max, std::vector<LightHit>& hits) const {
-    float total = -1.0f;
-    for (std::size_t i = 0; i < lights_.size(); ++i) {
+void LightSampler::intersect(const LightReceiver& receiver, const V3f& origin, const V3f& direction, float t_max,
+                             std::vector<LightHit>& hits, LightUse use) const {
+    thread_local std::vector<int> candidates;
+    thread_local LightPicker::Weights weights;
+    candidates.clear();
+    world().all->find_along(origin, direction, t_max, candidates);
+    // Light from infinity, and lights that shine through what is in the way.
+    world().all->append_infinite(candidates);
+    candidates.insert(candidates.end(), world().odd_shadows.begin(), world().odd_shadows.end());
+    std::sort(candidates.begin(), candidates.end());
+    candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+    bool is_weighed = false;
+    for (const int light : candidates) {
+        if (!is_linked(light, receiver.object)) continue;
         LightHit hit;
-        hit.light = int(i);
-        if (!(*world_lights_)[i].intersect(origin, direction, t_max, hit)) continue;
-        if (total < 0.0f) total = pick_total(origin);
-        hit.pdf *= total > 0.0f ? pick_weight(i, origin) / total : 0.0f;
+        hit.light = light;
+        if (!world_light(light).intersect(origin, direction, has_plain_shadow(light) ? t_max : kInfinity, hit))
+            continue;
+        if (!is_weighed) picker(use).weigh(receiver, weights);
+        is_weighed = true;
+        hit.pdf *= picker(use).probability(receiver, weights, light);
         hits.push_back(hit);
     }
 }
 
+int LightSampler::light_of_object(std::uint32_t object) const {
+    const std::vector<int>& lights = world().light_of_object;
+    return object < lights.size() ? lights[object] : -1;
+}
+
+bool LightSampler::hit_object(const LightReceiver& receiver, std::uint32_t object, std::uint32_t triangle,
+                              const V3f& direction, float t, LightHit& hit, LightUse use) const {
+    hit.light = light_of_object(object);
+    if (hit.light < 0 || !is_linked(hit.light, receiver.object)) return false;
+    if (!world_light(hit.light).hit_triangle(triangle, direction, t, hit)) return false;
+    thread_local LightPicker::Weights weights;
+    picker(use).weigh(receiver, weights);
+    hit.pdf *= picker(use).probability(receiver, weights, hit.light);
+    return true;
+}
+
 Rgb LightSampler::background(const V3f& direction) const {
     Rgb sum(0.0f);
-    for (const WorldLight& light : *world_lights_) {
+    for (const WorldLight& light : world().lights) {
         if (light.is_dome()) sum += light.dome_radiance(direction);
     }
     return sum;

@@ -1,20 +1,27 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: one light picked per sample in proportion to the irradiance that it can give at the point, then a direction on
-//   it (world_light.h).
+// Model: one light picked per sample by the irradiance that it can give (light_picker.h), then a direction on it
+//   (world_light.h).
 // Units: pdf per steradian, the pick included.
-// Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose diffuse and
-//   specular multipliers are both 0 is never picked by sample().
+// Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose multipliers of the
+//   wanted use are 0, or that is not linked to the receiver's object, is never picked.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "frazil/base/vec.h"
 #include "frazil/lighting/light.h"
+#include "frazil/lighting/light_picker.h"
+#include "frazil/lighting/linking.h"
 #include "frazil/lighting/world_light.h"
 
 namespace frazil {
+
+// What the light is wanted for: which multipliers weigh in the pick.
+enum class LightUse { surface, translucency, refraction, volume };  // surface = diffuse and specular
+inline constexpr std::size_t kLightUseCount = 4;
 
 class LightSampler {
   public:
@@ -23,29 +30,72 @@ class LightSampler {
 
     bool is_empty() const { return lights_.empty(); }
     const std::vector<Light>& lights() const { return lights_; }
-    const WorldLight& world_light(int light) const { return (*world_lights_)[std::size_t(light)]; }
+    const WorldLight& world_light(int light) const { return world().lights[std::size_t(light)]; }
 
-    // One direction for the point; `u_pick` chooses the light, `u` the direction.
-    LightSample sample(const V3f& position, float u_pick, const V2f& u) const;
+    // One light for the receiver, without a direction.
+    LightPick pick(const LightReceiver& receiver, float u, LightUse use = LightUse::surface) const;
+    // One direction for the receiver; `u_pick` chooses the light, `u` the direction.
+    LightSample sample(const LightReceiver& receiver, float u_pick, const V2f& u,
+                       LightUse use = LightUse::surface) const;
+    LightSample sample(const V3f& position, float u_pick, const V2f& u) const {
+        return sample(LightReceiver{position, V3f(0.0f), kNoObject}, u_pick, u);
+    }
     // A direction towards one given light, so that every light (group) can be served on its own; its pdf has no pick.
     LightSample sample_one(int light, const V3f& position, const V2f& u) const;
     // Many at once: out[i] from u[i].
     void sample_many(int light, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
 
-    // Every light along the ray that has a finite extent or is a dome, in front of t_max: appended to `hits`. Light
-    // from infinity (dome, distant) is seen only where t_max is infinite. pdf includes the pick of sample().
-    void intersect(const V3f& origin, const V3f& direction, float t_max, std::vector<LightHit>& hits) const;
+    // Every light along the ray that has a finite extent or is a dome, in front of t_max: appended to `hits` in the order
+    // of the lights. Light from infinity (dome, distant) is seen only where t_max is infinite; lights whose shadows are
+    // not plain are seen whatever t_max. pdf includes the pick that sample() makes for the receiver; lights that are not
+    // linked to it are left out. Mesh lights are met by their object's triangles instead: see hit_object().
+    void intersect(const LightReceiver& receiver, const V3f& origin, const V3f& direction, float t_max,
+                   std::vector<LightHit>& hits, LightUse use = LightUse::surface) const;
+    void intersect(const V3f& origin, const V3f& direction, float t_max, std::vector<LightHit>& hits) const {
+        intersect({origin, V3f(0.0f), kNoObject}, origin, direction, t_max, hits);
+    }
+    // The mesh light that an object shows, if the ray meets its bright side on this triangle at distance t.
+    bool hit_object(const LightReceiver& receiver, std::uint32_t object, std::uint32_t triangle, const V3f& direction,
+                    float t, LightHit& hit, LightUse use = LightUse::surface) const;
+    // The mesh light that an object shows; -1 for none.
+    int light_of_object(std::uint32_t object) const;
+    // Whether a mesh light stands for its object's material, which camera rays see itself.
+    bool is_material(int light) const { return std::get<MeshLight>(lights_[std::size_t(light)].shape).is_material; }
 
     // Dome radiance alone (the background of camera rays).
     Rgb background(const V3f& direction) const;
 
+    bool is_linked(int light, std::uint32_t object) const {
+        return world().table.has(world().link_of_light[std::size_t(light)], object);
+    }
+    // Opaque shadows of every object: one ray tells.
+    bool has_plain_shadow(int light) const { return world().is_plain[std::size_t(light)]; }
+    // The objects that cast a light's shadows, one byte each; null = all.
+    const std::vector<std::uint8_t>* casters(int light) const {
+        return world().table.members(world().casters_of_light[std::size_t(light)]);
+    }
+    // A picker of its own for some of the lights; it lives no longer than this.
+    LightPicker make_picker(std::span<const PickEntry> entries) const {
+        return {world().lights, entries, world().table, world().link_of_light};
+    }
+
   private:
-    // The weight of one light in the choice at a point.
-    float pick_weight(std::size_t light, const V3f& position) const;
-    float pick_total(const V3f& position) const;
+    // What does not move when the sampler does.
+    struct World {
+        std::vector<WorldLight> lights;
+        LinkTable table;
+        std::vector<std::uint32_t> link_of_light, casters_of_light;
+        std::vector<std::uint8_t> is_plain;
+        std::vector<int> odd_shadows;  // the lights with extent that are not plain
+        std::vector<int> light_of_object;
+        std::array<std::shared_ptr<const LightPicker>, kLightUseCount> pickers;
+        std::shared_ptr<const LightPicker> all;  // whatever the multipliers: for rays that run into lights
+    };
+    const World& world() const { return *world_; }
+    const LightPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
 
     std::vector<Light> lights_;
-    std::shared_ptr<const std::vector<WorldLight>> world_lights_;
+    std::shared_ptr<const World> world_;
 };
 
 }  // namespace frazil

@@ -2,15 +2,10 @@
 
 #include <algorithm>
 
-#include "frazil/base/trigonometry.h"
-#include "frazil/lighting/spherical_rectangle.h"
-
 namespace frazil {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// Shadow rays end this fraction before the light.
-constexpr float kShadowEnd = 0.9999f;
 
 V3f row(const M44f& m, int i) {
     return {m[i][0], m[i][1], m[i][2]};
@@ -24,42 +19,13 @@ float determinant(const V3f& x, const V3f& y, const V3f& z) {
     return x.cross(y).dot(z);
 }
 
-float cube(float x) {
-    return x * x * x;
-}
-
-// A direction of the cone with 1 - cos = cap about `axis`, uniform in solid angle.
-V3f sample_cone(const V3f& axis, float cap, const V2f& u) {
-    const float one_minus_cos = cap * u.x;
-    const float sine = std::sqrt(std::max(0.0f, one_minus_cos * (2.0f - one_minus_cos)));
-    const V2f circle = cos_sin_turns(u.y) * sine;
-    const auto [s, t] = tangent_frame(axis);
-    return s * circle.x + t * circle.y + axis * (1.0f - one_minus_cos);
-}
-
-V3f uniform_sphere(const V2f& u) {
-    const float z = 1.0f - 2.0f * u.x, s = std::sqrt(std::max(0.0f, 1.0f - z * z)), phi = 2.0f * kPi * u.y;
-    return {s * std::cos(phi), z, s * std::sin(phi)};
-}
-
-// The nearest root of |o + t d|² = 1 seen from outside, and the same for a cylinder by dropping a coordinate; false
-// where it lies behind or the origin is inside. Stable for far origins: b² - ac through the foot of the perpendicular.
-bool enter_unit_ball(const V3f& o, const V3f& d, float& t) {
-    const float a = d.dot(d), b = -o.dot(d), c = o.dot(o) - 1.0f;
-    if (c <= 0.0f || b <= 0.0f) return false;
-    const V3f foot = o + d * (b / a);
-    const float discriminant = a * (1.0f - foot.dot(foot));
-    if (discriminant < 0.0f) return false;
-    t = c / (b + std::sqrt(discriminant));
-    return true;
-}
-
 }  // namespace
 
 // Turns each kind of light into its form in world space, and says how far it extends.
 class WorldLight::Builder {
   public:
-    Builder(const Light& light, Extent& extent) : light_(light), m_(light.light_to_world), extent_(extent) {}
+    Builder(const Light& light, Extent& extent, LightBounds& bounds)
+        : light_(light), m_(light.light_to_world), extent_(extent), bounds_(bounds) {}
 
     using Shape = decltype(WorldLight::shape_);
 
@@ -80,6 +46,8 @@ class WorldLight::Builder {
         const V3f x = row(m_, 0).normalized(), y = row(m_, 1).normalized(), normal = shining_side();
         const float width = rect.width * row(m_, 0).length(), height = rect.height * row(m_, 1).length();
         set_extent(0.5f * std::sqrt(width * width + height * height) * (1.0f + std::abs(x.dot(y))), 1.0f, normal);
+        const V3f half_x = x * (0.5f * width), half_y = y * (0.5f * height);
+        set_box({half_x + half_y, half_x - half_y}, false);
         return Rect{m_.translation(),
                     normal,
                     x,
@@ -87,24 +55,38 @@ class WorldLight::Builder {
                     width,
                     height,
                     from_rows(x, y, normal).inverse(),
-                    std::abs(determinant(x, y, normal))};
+                    std::abs(determinant(x, y, normal)),
+                    rect.image};
     }
     Shape operator()(const DiskLight& disk) const {
         const V3f x = row(m_, 0) * disk.radius, y = row(m_, 1) * disk.radius, normal = shining_side();
         set_extent(x.length() + y.length(), 1.0f, normal);
+        set_box({x, y}, true);
         return Disk{
             m_.translation(), normal, x, y, static_cast<float>(size_factor(light_)), from_rows(x, y, normal).inverse()};
     }
     Shape operator()(const SphereLight& sphere) const {
         const V3f x = row(m_, 0) * sphere.radius, y = row(m_, 1) * sphere.radius, z = row(m_, 2) * sphere.radius;
         set_extent(std::max(x.length(), std::max(y.length(), z.length())) * 1.7321f, 0.25f, V3f(0.0f));
+        set_box({x, y, z}, true);
         return make_map<Sphere>(x, y, z);
     }
     Shape operator()(const CylinderLight& cylinder) const {
         const V3f axis = row(m_, 0) * cylinder.length;
         const V3f y = row(m_, 1) * cylinder.radius, z = row(m_, 2) * cylinder.radius;
         set_extent(0.5f * axis.length() + y.length() + z.length(), 1.0f / kPi, V3f(0.0f));
+        set_box({y, z}, true);
+        const V3f half(0.5f * std::abs(axis.x), 0.5f * std::abs(axis.y), 0.5f * std::abs(axis.z));
+        bounds_.box = Box3f(bounds_.box.min - half, bounds_.box.max + half);
         return make_map<Cylinder>(axis, y, z);
+    }
+    Shape operator()(const MeshLight&) const {
+        MeshEmitter mesh(light_);
+        const V3f center = (mesh.box().min + mesh.box().max) * 0.5f;
+        const float seen = static_cast<float>(mesh.area()) * (mesh.is_two_sided() ? 0.5f : 0.25f);
+        extent_ = {center, (mesh.box().max - center).length(), seen, V3f(0.0f)};
+        bounds_.box = mesh.box();
+        return mesh;
     }
 
   private:
@@ -123,9 +105,27 @@ class WorldLight::Builder {
         extent_ = {m_.translation(), radius, static_cast<float>(size_factor(light_)) * share_of_area, normal};
     }
 
+    // The box about the centre that holds all sums of ± the vectors, or (is_round) the ellipsoid that they span; and the
+    // cone of normals that the extent tells.
+    void set_box(std::initializer_list<V3f> vectors, bool is_round) const {
+        V3f reach(0.0f);
+        for (int axis = 0; axis < 3; ++axis) {
+            for (const V3f& v : vectors) {
+                reach[axis] = is_round ? reach[axis] + v[axis] * v[axis] : std::max(reach[axis], std::abs(v[axis]));
+            }
+            if (is_round) reach[axis] = std::sqrt(reach[axis]);
+        }
+        bounds_.box = Box3f(extent_.center - reach, extent_.center + reach);
+        if (extent_.normal == V3f(0.0f)) return;
+        bounds_.axis = extent_.normal;
+        bounds_.cos_spread = 1.0f;
+        bounds_.cos_emission = 0.0f;
+    }
+
     const Light& light_;
     const M44f& m_;
     Extent& extent_;
+    LightBounds& bounds_;
 };
 
 WorldLight::WorldLight(const Light& light) {
@@ -133,7 +133,30 @@ WorldLight::WorldLight(const Light& light) {
     radiance_ = emitted_radiance(light);
     const auto absolute = [](const Rgb& c) { return luminance({std::abs(c.x), std::abs(c.y), std::abs(c.z)}); };
     brightness_ = absolute(radiance_);
-    shape_ = std::visit(Builder(light, extent_), light.shape);
+    shape_ = std::visit(Builder(light, extent_, bounds_), light.shape);
+    shaping_ = light.shaping;
+    is_shaped_ = is_finite() && !shaping_.is_neutral();
+    axis_ = -row(light.light_to_world, 2).normalized();
+    if (const Rect* rect = std::get_if<Rect>(&shape_); rect && rect->image) {
+        brightness_ *= std::max(rect->image->brightness(), 1e-3f);
+    }
+    if (const MeshEmitter* mesh = std::get_if<MeshEmitter>(&shape_)) brightness_ *= mesh->brightness();
+    bounds_.power = brightness_ * extent_.projected_area;
+    bounds_.center = (bounds_.box.min + bounds_.box.max) * 0.5f;
+    if (is_shaped_ && shaping_.has_cone() && shaping_.cone_angle < 90.0f) {
+        // No light leaves farther from the axis than the cone's angle, whatever the normal.
+        const float angle = shaping_.cone_angle * (kPi / 180.0f) + 0.01f;
+        bounds_.axis = axis_;
+        bounds_.cos_spread = std::cos(angle);
+        bounds_.cos_emission = 1.0f - 1e-4f;
+        bounds_.beamed = bounds_.power;
+        bounds_.beam = axis_ * bounds_.power;
+        bounds_.beam_angle = bounds_.power * angle;
+    } else if (extent_.normal != V3f(0.0f)) {
+        bounds_.flow = extent_.normal * bounds_.power;
+    } else {
+        bounds_.even = bounds_.power;
+    }
     if (const Dome* dome = std::get_if<Dome>(&shape_); dome && dome->image) {
         brightness_ = absolute(radiance_ * dome->image->average());
         // An image whose pixels cancel must still be found.
@@ -144,11 +167,24 @@ WorldLight::WorldLight(const Light& light) {
 void WorldLight::sample(const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const {
     std::fill(out.begin(), out.end(), LightSample());
     std::visit([&](const auto& shape) { sample_from(shape, position, u, out); }, shape_);
+    if (!is_shaped_) return;
+    for (LightSample& sample : out) {
+        if (sample.pdf > 0.0f) sample.radiance *= shaped(sample.direction);
+    }
 }
 
 bool WorldLight::intersect(const V3f& origin, const V3f& direction, float t_max, LightHit& hit) const {
-    return std::visit([&](const auto& shape) { return hit_by(shape, origin, direction, hit); }, shape_) &&
-           (hit.distance < t_max || (hit.distance == kInfinity && t_max == kInfinity));
+    if (!std::visit([&](const auto& shape) { return hit_by(shape, origin, direction, hit); }, shape_)) return false;
+    if (is_shaped_) hit.radiance *= shaped(direction);
+    return hit.distance < t_max || (hit.distance == kInfinity && t_max == kInfinity);
+}
+
+bool WorldLight::hit_triangle(std::uint32_t triangle, const V3f& direction, float t, LightHit& hit) const {
+    const MeshEmitter::Sample found = std::get<MeshEmitter>(shape_).at(triangle, direction, t);
+    if (!(found.pdf > 0.0f)) return false;
+    hit = {radiance_ * found.factor, found.pdf, t, hit.light};
+    if (is_shaped_) hit.radiance *= shaped(direction);
+    return true;
 }
 
 bool WorldLight::is_uniform_dome() const {
@@ -182,225 +218,12 @@ float WorldLight::importance(const V3f& position) const {
         facing = std::min(1.0f, (height + radius) / std::max(distance, 1e-30f));
     }
     const float d = std::max(distance, radius);
+    if (is_shaped_ && distance > radius) {
+        // As seen from the light's middle; what a part of the light may send beyond the cone from there is a bound's.
+        if (frazil::importance(bounds_, position, V3f(0.0f)) == 0.0f) return 0.0f;
+        facing *= std::max(luminance(shaped(to_light / distance)), 0.02f);
+    }
     return brightness_ * (extent_.projected_area / d) * (facing / d);
-}
-
-// ---- dome ----
-
-void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> u, std::span<LightSample> out) const {
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        if (!dome.image) {
-            sample.direction = uniform_sphere(u[i]);
-            sample.radiance = radiance_;
-            sample.pdf = 0.25f * kInvPi;
-            continue;
-        }
-        const V3f local = dome.image->sample(u[i], sample.pdf, sample.radiance);
-        sample.direction = dome.x * local.x + dome.y * local.y + dome.z * local.z;
-        sample.radiance *= radiance_;
-    }
-}
-
-bool WorldLight::hit_by(const Dome&, const V3f&, const V3f& direction, LightHit& hit) const {
-    hit.radiance = dome_radiance(direction, hit.pdf);
-    hit.distance = kInfinity;
-    return true;
-}
-
-// ---- distant ----
-
-void WorldLight::sample_from(const Distant& distant, const V3f&, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        sample.radiance = radiance_;
-        sample.is_delta = distant.cap == 0.0f;
-        sample.direction = sample.is_delta ? distant.axis : sample_cone(distant.axis, distant.cap, u[i]);
-        sample.pdf = sample.is_delta ? 1.0f : 0.5f * kInvPi / distant.cap;
-    }
-}
-
-bool WorldLight::hit_by(const Distant& distant, const V3f&, const V3f& direction, LightHit& hit) const {
-    // 1 - cos from the chord, which keeps small angles.
-    if (!(0.5f * (direction - distant.axis).length2() < distant.cap)) return false;
-    hit = {radiance_, 0.5f * kInvPi / distant.cap, kInfinity, hit.light};
-    return true;
-}
-
-// ---- rect ----
-
-namespace {
-
-// The rect as seen from a point, in its own frame. `at` is the point there.
-SphericalRectangle seen_from(const V3f& at, float width, float height) {
-    const double w = 0.5 * double(width), h = 0.5 * double(height);
-    return {-w - double(at.x), w - double(at.x), -h - double(at.y), h - double(at.y), double(at.z)};
-}
-
-}  // namespace
-
-void WorldLight::sample_from(const Rect& rect, const V3f& position, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    V3f at;
-    rect.world_to_local.multDirMatrix(position - rect.center, at);
-    if (!(at.z > 0.0f)) return;
-    const SphericalRectangle view = seen_from(at, rect.width, rect.height);
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        const V3d local = view.sample(u[i]);
-        const float local_length = static_cast<float>(local.length());
-        const V3f to_light = rect.x * float(local.x) + rect.y * float(local.y) + rect.normal * float(local.z);
-        const float distance = to_light.length();
-        sample.direction = to_light / distance;
-        sample.distance = distance * kShadowEnd;
-        sample.radiance = radiance_;
-        sample.pdf = static_cast<float>(view.pdf(local)) * cube(distance / local_length) / rect.shear;
-    }
-}
-
-bool WorldLight::hit_by(const Rect& rect, const V3f& origin, const V3f& direction, LightHit& hit) const {
-    V3f at, along;
-    rect.world_to_local.multDirMatrix(origin - rect.center, at);
-    rect.world_to_local.multDirMatrix(direction, along);
-    if (!(at.z > 0.0f && along.z < 0.0f)) return false;
-    const float t = -at.z / along.z, x = at.x + t * along.x, y = at.y + t * along.y;
-    if (!(std::abs(x) <= 0.5f * rect.width && std::abs(y) <= 0.5f * rect.height)) return false;
-    const SphericalRectangle view = seen_from(at, rect.width, rect.height);
-    const V3d local = V3d(along) * double(t);
-    const float density = static_cast<float>(view.pdf(local)) * cube(1.0f / along.length()) / rect.shear;
-    hit = {radiance_, density, t, hit.light};
-    return true;
-}
-
-// ---- disk ----
-
-void WorldLight::sample_from(const Disk& disk, const V3f& position, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    const V3f to_center = disk.center - position;
-    const float height = -to_center.dot(disk.normal);
-    if (!(height > 0.0f)) return;
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        const V2f circle = cos_sin_turns(u[i].y) * std::sqrt(u[i].x);
-        const V3f to_light = to_center + disk.x * circle.x + disk.y * circle.y;
-        const float distance = to_light.length();
-        sample.direction = to_light / distance;
-        sample.distance = distance * kShadowEnd;
-        sample.radiance = radiance_;
-        sample.pdf = cube(distance) / (height * disk.area);
-    }
-}
-
-bool WorldLight::hit_by(const Disk& disk, const V3f& origin, const V3f& direction, LightHit& hit) const {
-    const float height = (origin - disk.center).dot(disk.normal), down = -direction.dot(disk.normal);
-    if (!(height > 0.0f && down > 0.0f)) return false;
-    const float t = height / down;
-    V3f local;
-    disk.world_to_local.multDirMatrix(origin + direction * t - disk.center, local);
-    if (!(local.x * local.x + local.y * local.y <= 1.0f)) return false;
-    hit = {radiance_, t * t / (down * disk.area), t, hit.light};
-    return true;
-}
-
-// ---- sphere ----
-
-namespace {
-
-// The unit sphere seen from `at` outside it: 1 - cos of its half angle, without cancellation far away.
-float cap_of_unit_sphere(const V3f& at) {
-    const float sine2 = std::min(1.0f, 1.0f / at.length2());
-    return sine2 / (1.0f + std::sqrt(1.0f - sine2));
-}
-
-}  // namespace
-
-void WorldLight::sample_from(const Sphere& sphere, const V3f& position, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    V3f at;
-    sphere.world_to_local.multDirMatrix(position - sphere.center, at);
-    const float distance2 = at.length2();
-    if (!(distance2 > 1.0f)) return;
-    const float cap = cap_of_unit_sphere(at), center_distance = std::sqrt(distance2);
-    const V3f axis = -at / center_distance;
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        const V3f local = sample_cone(axis, cap, u[i]);
-        const float along = center_distance * local.dot(axis);
-        const V3f foot = at + local * along;
-        // The near side, at c/(b + sqrt) as c = distance² - 1 does not cancel far away.
-        const float t = (distance2 - 1.0f) / (along + std::sqrt(std::max(0.0f, 1.0f - foot.length2())));
-        V3f direction;
-        sphere.local_to_world.multDirMatrix(local, direction);
-        const float stretch = direction.length();
-        sample.direction = direction / stretch;
-        sample.distance = t * stretch * kShadowEnd;
-        sample.radiance = radiance_;
-        sample.pdf = 0.5f * kInvPi / cap * cube(stretch / sphere.scale);
-    }
-}
-
-bool WorldLight::hit_by(const Sphere& sphere, const V3f& origin, const V3f& direction, LightHit& hit) const {
-    V3f at, along;
-    sphere.world_to_local.multDirMatrix(origin - sphere.center, at);
-    sphere.world_to_local.multDirMatrix(direction, along);
-    float t;
-    if (!enter_unit_ball(at, along, t)) return false;
-    const float stretch = 1.0f / along.length();
-    hit = {radiance_, 0.5f * kInvPi / cap_of_unit_sphere(at) * cube(stretch / sphere.scale), t, hit.light};
-    return true;
-}
-
-// ---- cylinder ----
-
-namespace {
-
-// Half the angle under which a point at `distance` > 1 from its axis sees a unit cylinder.
-float half_width(float distance) {
-    return std::asin(1.0f / distance);
-}
-
-}  // namespace
-
-void WorldLight::sample_from(const Cylinder& cylinder, const V3f& position, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    V3f at;
-    cylinder.world_to_local.multDirMatrix(position - cylinder.center, at);
-    const float axis_distance = std::sqrt(at.y * at.y + at.z * at.z);
-    if (!(axis_distance > 1.0f)) return;
-    const float half = half_width(axis_distance);
-    const V2f inward(-at.y / axis_distance, -at.z / axis_distance);
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        // Across: an angle seen from the point, and the near side of the circle there. Along: uniform in length.
-        const float psi = (2.0f * u[i].x - 1.0f) * half, c = std::cos(psi), s = std::sin(psi);
-        const float offset = axis_distance * s;
-        const float across = (axis_distance * axis_distance - 1.0f) /
-                             (axis_distance * c + std::sqrt(std::max(0.0f, 1.0f - offset * offset)));
-        const V3f local(u[i].y - 0.5f - at.x, across * (c * inward.x - s * inward.y),
-                        across * (s * inward.x + c * inward.y));
-        V3f to_light;
-        cylinder.local_to_world.multDirMatrix(local, to_light);
-        const float distance = to_light.length();
-        sample.direction = to_light / distance;
-        sample.distance = distance * kShadowEnd;
-        sample.radiance = radiance_;
-        // In the local frame dw = across²/r³ dx dpsi; the map to the world turns r³ into distance³/|det|.
-        sample.pdf = cube(distance / cylinder.scale) / (across * across * 2.0f * half);
-    }
-}
-
-bool WorldLight::hit_by(const Cylinder& cylinder, const V3f& origin, const V3f& direction, LightHit& hit) const {
-    V3f at, along;
-    cylinder.world_to_local.multDirMatrix(origin - cylinder.center, at);
-    cylinder.world_to_local.multDirMatrix(direction, along);
-    float t;
-    if (!enter_unit_ball(V3f(0.0f, at.y, at.z), V3f(0.0f, along.y, along.z), t)) return false;
-    if (!(std::abs(at.x + t * along.x) <= 0.5f)) return false;
-    const float across2 = t * t * (along.y * along.y + along.z * along.z);
-    const float half = half_width(std::sqrt(at.y * at.y + at.z * at.z));
-    hit = {radiance_, cube(t / cylinder.scale) / (across2 * 2.0f * half), t, hit.light};
-    return true;
 }
 
 }  // namespace frazil

@@ -1,7 +1,8 @@
 // One light in world space: directions towards it with their densities, and what a ray sees of it.
 // Model: rect by its solid angle [Urena2013], sphere by its cone of directions [PBRT4, Section 12.2], disk by area,
-//   cylinder by the angle across and its length, distant uniform in its cone, dome by its image. Sheared or unevenly
-//   scaled shapes are sampled in the frame where they are not, and the density follows the map.
+//   cylinder by the angle across and its length, distant uniform in its cone, dome by its image, mesh by area; a rect
+//   with an image half by its solid angle, half by the image. Sheared or unevenly scaled shapes are sampled in the frame
+//   where they are not, and the density follows the map.
 // Units: pdf per steradian.
 // Valid: any light that check_light accepts; the density of intersect() is that of sample().
 // Not: the choice among lights (light_sampling.h).
@@ -13,6 +14,8 @@
 
 #include "frazil/base/vec.h"
 #include "frazil/lighting/light.h"
+#include "frazil/lighting/light_bounds.h"
+#include "frazil/lighting/mesh_emitter.h"
 
 namespace frazil {
 
@@ -41,11 +44,18 @@ class WorldLight {
     // out[i] from u[i]; the pdf has no pick and `light` stays -1. Samples towards one point share its set-up.
     void sample(const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
 
-    // False where the ray misses, or meets the light at or beyond t_max or from its dark side.
+    // False where the ray misses, or meets the light at or beyond t_max or from its dark side. Never a mesh: see
+    // hit_triangle().
     bool intersect(const V3f& origin, const V3f& direction, float t_max, LightHit& hit) const;
+
+    // The same for a ray that has met a triangle of a mesh light's object at distance t.
+    bool hit_triangle(std::uint32_t triangle, const V3f& direction, float t, LightHit& hit) const;
 
     // An estimate of the absolute irradiance at a point, for the choice among lights; 0 only where no light arrives.
     float importance(const V3f& position) const;
+    // Where it is and where to it shines; only where is_finite().
+    const LightBounds& bounds() const { return bounds_; }
+    bool is_finite() const { return !is_dome() && !std::holds_alternative<Distant>(shape_); }
 
     bool is_dome() const { return std::holds_alternative<Dome>(shape_); }
     // A uniform dome: cosine-weighted directions serve it best.
@@ -70,6 +80,7 @@ class WorldLight {
         float width, height;  // in metres
         M44f world_to_local;  // rotation (and shear) about `center` into the frame (x, y, normal)
         float shear;          // |det| of (x, y, normal); 1 for a true rectangle
+        std::shared_ptr<const LightImage> image;
     };
     struct Disk {
         V3f center, normal, x, y;  // semi-axes
@@ -94,6 +105,12 @@ class WorldLight {
     };
     class Builder;
 
+    // The square of the image that a place of the rect shows, and the image's density of directions there.
+    V2f image_place(const Rect& rect, const V3d& local_offset, const V3f& at) const;
+    float image_pdf(const Rect& rect, const V2f& place, const V3f& to_light) const;
+    // What shaping leaves of light that travels to the receiver against `direction`.
+    Rgb shaped(const V3f& direction) const { return eval(shaping_, -direction.dot(axis_)); }
+
     void sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
     void sample_from(const Distant& distant, const V3f& position, std::span<const V2f> u,
                      std::span<LightSample> out) const;
@@ -103,17 +120,24 @@ class WorldLight {
                      std::span<LightSample> out) const;
     void sample_from(const Cylinder& cylinder, const V3f& position, std::span<const V2f> u,
                      std::span<LightSample> out) const;
+    void sample_from(const MeshEmitter& mesh, const V3f& position, std::span<const V2f> u,
+                     std::span<LightSample> out) const;
     bool hit_by(const Dome& dome, const V3f& origin, const V3f& direction, LightHit& hit) const;
     bool hit_by(const Distant& distant, const V3f& origin, const V3f& direction, LightHit& hit) const;
     bool hit_by(const Rect& rect, const V3f& origin, const V3f& direction, LightHit& hit) const;
     bool hit_by(const Disk& disk, const V3f& origin, const V3f& direction, LightHit& hit) const;
     bool hit_by(const Sphere& sphere, const V3f& origin, const V3f& direction, LightHit& hit) const;
     bool hit_by(const Cylinder& cylinder, const V3f& origin, const V3f& direction, LightHit& hit) const;
+    bool hit_by(const MeshEmitter&, const V3f&, const V3f&, LightHit&) const { return false; }
 
     Rgb radiance_;
     float brightness_;  // absolute luminance
     Extent extent_;
-    std::variant<Dome, Distant, Rect, Disk, Sphere, Cylinder> shape_;
+    LightBounds bounds_;
+    Shaping shaping_;
+    bool is_shaped_ = false;
+    V3f axis_;  // of the shaping, the light's -z
+    std::variant<Dome, Distant, Rect, Disk, Sphere, Cylinder, MeshEmitter> shape_;
 };
 
 }  // namespace frazil

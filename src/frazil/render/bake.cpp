@@ -104,10 +104,12 @@ std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ra
         if (lit[i].points.size() == 0) continue;
         Stopwatch watch(stats.seconds["bake"]);
         const IceMaterial& material = *bodies[i]->material;
+        IrradianceOptions bake_options{options.bake_samples, options.seed};
+        bake_options.objects = {static_cast<std::uint32_t>(i)};
         Irradiance irradiance = bake_irradiance(
             lit[i].points, ray_scene, lights,
-            [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); },
-            {options.bake_samples, options.seed}, progress);
+            [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
+            progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;
         keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), irradiance.values);

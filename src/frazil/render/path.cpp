@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "frazil/lighting/shadow.h"
 #include "frazil/material/microfacet.h"
 
 namespace frazil {
@@ -87,6 +88,10 @@ struct PathTracer::Path {
     // of the camera leaves.
     Scattering last;
     bool is_delta = false;  // lights could not be chosen at the last vertex
+    // Who receives light at the last vertex (the camera: everything), and which multipliers weigh in the choice there.
+    LightReceiver receiver;
+    LightUse use = LightUse::surface;
+    bool has_passed = false;  // through a surface without a lobe, since then
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
     bool has_direct_light = false, is_glossy = false;
@@ -138,6 +143,13 @@ struct PathTracer::Path {
         has_direct_light = false;
     }
 
+    // `side` is that of the surface which receives.
+    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
+        receiver = {surface.position, side, surface.object};
+        use = wanted;
+        has_passed = false;
+    }
+
     void leave_from(const V3f& position, const V3f& side, const V3f& direction) {
         ray.origin = offset_origin(position, side);
         ray.direction = direction;
@@ -156,6 +168,7 @@ struct PathTracer::Path {
         ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ray.t_max -= t;
         ray.t_min = 0.0f;
+        has_passed = true;
         ++straight;
     }
 
@@ -187,6 +200,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     Path path;
     path.pixel = pixel;
     path.ray = camera_ray;
+    path.receiver.position = camera_ray.origin;
     path.sampler = sampler;
     path.last.refraction = Rgb(1.0f);
     path.width = pixel_.radius;
@@ -224,7 +238,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             if (!meet_sheet(path, position, sheet_normal, sheet_color, tile)) return;
             continue;
         }
-        add_lights_on_ray(path, length, tile);
+        add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
@@ -269,9 +283,12 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         note_primary(shader.albedo(wo));
 
-        // What the surface itself gives: emission, and light that diffused through ice.
-        if (const Rgb emission = shader.emission(); emission != Rgb(0.0f)) {
-            deliver(path, Component::emission, path.weights(), 0, emission, tile);
+        // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
+        const int own_light = lights_.light_of_object(surface.object);
+        const bool is_own = own_light < 0 || (path.bounce == 0 && lights_.is_material(own_light));
+        if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
+            const std::size_t group = own_light < 0 ? 0 : group_of_light_[std::size_t(own_light)];
+            deliver(path, Component::emission, path.weights(), group, emission, tile);
         }
         float reflection_odds = 1.0f;
         if (body) {
@@ -311,6 +328,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         if (!(value.pdf > 0.0f)) return;
         value.scale(Rgb(1.0f / (value.pdf * reflection_odds)));
         path.scatter(value);
+        path.receive(surface, surface.geometric_normal, LightUse::surface);
         ++path.scattered;
         path.is_delta = false;
         path.has_direct_light = path.sees_lamps = true;
@@ -350,18 +368,34 @@ void PathTracer::deliver(const Path& path, Component primary, const Scattering& 
 
 // Light that the ray runs into: domes for camera rays, every light with an extent after that, weighted against
 // add_direct_light's choice of the same direction.
-void PathTracer::add_lights_on_ray(const Path& path, float t_max, Tile& tile) const {
+void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const {
     thread_local std::vector<LightHit> hits;
     hits.clear();
-    lights_.intersect(path.ray.origin, path.ray.direction, t_max, hits);
-    for (const LightHit& hit : hits) {
+    const float t_max = surface ? surface->t : std::numeric_limits<float>::infinity();
+    lights_.intersect(path.receiver, path.ray.origin, path.ray.direction, t_max, hits, path.use);
+    if (LightHit mesh; surface && lights_.hit_object(path.receiver, surface->placement, surface->triangle,
+                                                     path.ray.direction, t_max, mesh, path.use)) {
+        hits.push_back(mesh);
+    }
+    for (LightHit& hit : hits) {
         const Light& light = lights_.lights()[std::size_t(hit.light)];
-        const bool is_dome = std::holds_alternative<DomeLight>(light.shape);
-        if ((path.bounce == 0 || !path.sees_lamps) && !is_dome) continue;
+        if (path.bounce > 0 && !path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) continue;
+        const bool is_mesh = std::holds_alternative<MeshLight>(light.shape);
         const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
-            deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
+            if (t_max < hit.distance) continue;
+            if (is_mesh && !lights_.is_material(hit.light)) {
+                deliver(path, Component::emission, path.weights(), group, hit.radiance, tile);
+            } else if (std::holds_alternative<DomeLight>(light.shape)) {
+                deliver(path, Component::background, path.weights(), group, hit.radiance, tile);
+            }
             continue;
+        }
+        // Lights whose shadows are not plain may shine through what the ray has met: they are asked once, from the vertex.
+        if (!lights_.has_plain_shadow(hit.light) && !is_mesh) {
+            if (path.inside.is_empty() ? path.has_passed : t_max < hit.distance) continue;
+            const Ray shadow{path.ray.origin, path.ray.direction, 0.0f, hit.distance * (1.0f - 1e-4f)};
+            if (path.inside.is_empty()) hit.radiance *= shadow_factor(ray_scene_, lights_, hit.light, shadow);
         }
         const float mis = path.is_delta ? 1.0f : path.last.pdf / (path.last.pdf + hit.pdf);
         const Scattering weights =
@@ -375,7 +409,8 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
@@ -388,8 +423,7 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     bool is_straight = true;
-    const Rgb visible =
-        interiors_.visibility(shadow, path.inside, tile.rays, true, &is_straight, shadow_footprint(path));
+    const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
     if (visible == Rgb(0.0f)) return;
     // Through a boundary broad lobes take light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight && shader.is_glossy()) specular_lobe = Rgb(0.0f);
@@ -407,6 +441,18 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
     tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
     tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
+}
+
+// What is left of a light along a ray; `is_straight` becomes false where a boundary would bend it. Inside ice shadows are
+// plain.
+Rgb PathTracer::visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
+                           bool& is_straight) const {
+    if (lights_.has_plain_shadow(light) || !inside.is_empty()) {
+        // Overlays on the way of light need no detail.
+        return interiors_.visibility(ray, inside, tile.rays, true, &is_straight, shadow_footprint(path));
+    }
+    ++tile.rays;
+    return shadow_factor(ray_scene_, lights_, light, ray);
 }
 
 // ---- ice ------------------------------------------------------------------------------------------------------------
@@ -436,6 +482,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     } else {
         path.pass_boundary();
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.is_delta = true;
     }
     path.inside = crossing.beyond;
@@ -523,13 +570,13 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     const auto cosine_pdf = [&](const V3f& wi) { return 0.5f * kInvPi * std::abs(normal.dot(wi)); };
     if (!lights_.is_empty()) {
         const float u_pick = path.sampler.next_1d();
-        const LightSample sample = lights_.sample(position, u_pick, path.sampler.next_2d());
+        const LightReceiver receiver{position, V3f(0.0f), static_cast<std::uint32_t>(body)};
+        const LightSample sample = lights_.sample(receiver, u_pick, path.sampler.next_2d(), LightUse::refraction);
         const float value = cosine_pdf(sample.direction);
         if (sample.pdf > 0.0f && value > 0.0f) {
             bool is_straight = true;
-            const Rgb visible =
-                interiors_.visibility({position, sample.direction, 0.0f, sample.distance * (1.0f - 1e-4f)}, path.inside,
-                                      tile.rays, true, &is_straight, shadow_footprint(path));
+            const Ray shadow{position, sample.direction, 0.0f, sample.distance * (1.0f - 1e-4f)};
+            const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
             const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value);
             const Light& light = lights_.lights()[std::size_t(sample.light)];
             Scattering weights = path.weights();
@@ -550,6 +597,9 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     const V3f local = cosine_hemisphere(path.sampler.next_2d());
     const V3f wi = Frame(u_side < 0.5f ? normal : -normal).to_world(local);
     path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)});
+    path.receiver = {position, V3f(0.0f), static_cast<std::uint32_t>(body)};
+    path.use = LightUse::refraction;
+    path.has_passed = false;
     path.is_delta = false;
     path.has_direct_light = path.sees_lamps = true;
     path.is_glossy = false;
@@ -595,6 +645,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
     if (sample.is_reflection) {
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.has_direct_light = path.sees_lamps = false;
         path.light_share = Rgb(1.0f);
         path.is_delta = true;
@@ -603,6 +654,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     } else {
         path.pass_boundary();
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)});
+        path.receive(surface, -surface.geometric_normal, LightUse::refraction);
         path.is_delta = crossing.to != InsideOf::kNone;
         path.inside = crossing.beyond;
         path.leave_from(surface.position, -surface.geometric_normal,
@@ -622,7 +674,8 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     Path beyond = path;
     beyond.pass_boundary();
     if (lights_.is_empty() || beyond.light_share == Rgb(0.0f)) return;
-    const LightSample sample = lights_.sample(surface.position, u_pick, u);
+    const LightReceiver receiver{surface.position, -surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, u, LightUse::refraction);
     if (!(sample.pdf > 0.0f) || sample.direction.dot(surface.geometric_normal) >= 0.0f) return;
     const Frame frame(surface.normal);
     const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
@@ -633,8 +686,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
-    const Rgb visible =
-        interiors_.visibility(shadow, crossing.beyond, tile.rays, true, &is_straight, shadow_footprint(path));
+    const Rgb visible = visibility(path, sample.light, shadow, crossing.beyond, tile, is_straight);
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
@@ -673,18 +725,16 @@ void PathTracer::add_entering_light(Core& core, const Surface& surface, const Bo
     const IceMaterial& ice = *body.material;
     if (ice.compensation.mode != CompensationMode::fill) return;
     const float u_pick = sampler.next_1d();
-    const LightSample sample = lights_.sample(surface.position, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d(), LightUse::translucency);
     const float cosine = surface.normal.dot(sample.direction);
     const Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
-    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f ||
-        ray_scene_.is_occluded(shadow)) {
-        return;
-    }
+    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
     const Light& light = lights_.lights()[std::size_t(sample.light)];
     const float entering = body.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
-    core.entering =
-        sample.radiance * (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
+    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
+                    (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
     core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);
 }
 

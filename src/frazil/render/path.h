@@ -49,9 +49,11 @@ class PathTracer {
     // Radiance to the layers of the path's first lobe; to `primary` where the camera sees it directly.
     void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,
                  Tile& tile) const;
-    void add_lights_on_ray(const Path& path, float t_max, Tile& tile) const;
+    void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
+    Rgb visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
+                   bool& is_straight) const;
     void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,
                           Sampler& sampler, Tile& tile) const;
 

@@ -80,28 +80,6 @@ V3f sample_henyey_greenstein(const V3f& direction, float g, const V2f& u) {
     return (x * (sine * std::cos(phi)) + y * (sine * std::sin(phi)) + direction * cosine).normalized();
 }
 
-// One light in proportion to what it may give at the position, multipliers included.
-int SingleScattering::pick_light(const V3f& position, float u, float& probability) const {
-    const std::size_t count = lights_.lights().size();
-    const auto weight = [&](std::size_t i) {
-        const float scale = std::abs(volume_multiplier(lights_.lights()[i]));
-        return scale == 0.0f ? 0.0f : scale * lights_.world_light(int(i)).importance(position);
-    };
-    float total = 0.0f;
-    for (std::size_t i = 0; i < count; ++i) total += weight(i);
-    if (!(total > 0.0f)) return -1;
-    float left = u * total;
-    int picked = -1;
-    for (std::size_t i = 0; i < count; ++i) {
-        const float w = weight(i);
-        if (w == 0.0f) continue;
-        picked = int(i), probability = w / total;
-        if (left < w) break;
-        left -= w;
-    }
-    return picked;
-}
-
 OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler, std::uint64_t& rays) const {
     OnceScattered result;
     const float u_light = sampler.next_1d();
@@ -115,8 +93,9 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
     };
 
     // The light that is scattered once, from one light.
-    float pick = 0.0f;
-    result.light = lights_.is_empty() ? -1 : pick_light(segment.origin, u_light, pick);
+    const auto body = static_cast<std::uint32_t>(interiors_.filling(segment.inside));
+    const LightPick pick = lights_.pick({segment.origin, V3f(0.0f), body}, u_light, LightUse::volume);
+    result.light = pick.light;
     if (result.light >= 0) {
         const Light& light = lights_.lights()[std::size_t(result.light)];
         const float length = cut(sigma_t);
@@ -140,7 +119,7 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
             // Light travels along -towards.direction before and -segment.direction after.
             const float phase = henyey_greenstein(towards.direction.dot(segment.direction), ice.anisotropy);
             result.radiance = sigma_s * exp(sigma_t * -t) * reaches * towards.radiance *
-                              (phase * volume_multiplier(light) / (density * towards.pdf * pick));
+                              (phase * volume_multiplier(light) / (density * towards.pdf * pick.probability));
         }
     }
 

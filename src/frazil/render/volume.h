@@ -48,8 +48,6 @@ class SingleScattering {
     OnceScattered sample(const Segment& segment, Sampler& sampler, std::uint64_t& rays) const;
 
   private:
-    int pick_light(const V3f& position, float u, float& probability) const;
-
     const LightSampler& lights_;
     const Interiors& interiors_;
     const std::vector<std::unique_ptr<Body>>& bodies_;

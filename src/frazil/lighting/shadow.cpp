@@ -1,0 +1,101 @@
+#include "frazil/lighting/shadow.h"
+
+#include <algorithm>
+#include <map>
+
+#include "frazil/translucency/fresnel.h"
+
+namespace frazil {
+namespace {
+
+constexpr float kNoLight = 1e-4f;  // below it light counts as stopped
+
+// How much of a shadow is there, by the distance of what casts it.
+float shadow_strength(const ShadowRules& rules, float distance) {
+    if (rules.distance < 0.0f || rules.falloff <= 0.0f) return 1.0f;
+    const float left = rules.distance - distance;
+    if (left >= rules.falloff) return 1.0f;
+    return std::pow(std::max(0.0f, left / rules.falloff), rules.falloff_gamma);
+}
+
+// The rays that nothing stops, by packets; the others are asked again where something may let light through.
+void plain_factors(const RayScene& scene, std::span<const Ray> rays, std::span<Rgb> out) {
+    thread_local std::vector<std::uint8_t> is_occluded;
+    is_occluded.resize(rays.size());
+    scene.are_occluded(rays, is_occluded);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        out[i] = Rgb(is_occluded[i] ? 0.0f : 1.0f);
+        if (is_occluded[i] && !scene.passages().empty()) out[i] = transmittance(scene, rays[i]);
+    }
+}
+
+}  // namespace
+
+Rgb transmittance(const RayScene& scene, const Ray& ray, PlacementMask mask) {
+    const std::vector<Passage>& passages = scene.passages();
+    Rgb passing(1.0f);
+    // Length inside each body: exits minus entries; and how many entries have no exit yet.
+    struct Inside {
+        float length = 0.0f;
+        int depth = 0;
+    };
+    std::map<std::uint32_t, Inside> bodies;
+    Ray left = ray;
+    Hit hit;
+    while (scene.intersect(left, hit, mask)) {
+        if (hit.placement >= passages.size() || !passages[hit.placement].is_open) return Rgb(0.0f);
+        // A slab reflects as much where light leaves it as where it entered, at the angle outside.
+        const float facing = -hit.geometric_normal.dot(ray.direction);
+        passing *= 1.0f - fresnel_dielectric(std::min(1.0f, std::abs(facing)), passages[hit.placement].eta);
+        if (max_component(passing) < kNoLight) return Rgb(0.0f);
+        Inside& inside = bodies[hit.placement];
+        inside.length += facing < 0.0f ? hit.t : -hit.t;
+        inside.depth += facing < 0.0f ? -1 : 1;
+        left.t_min = std::nextafter(hit.t * (1.0f + 1e-6f), std::numeric_limits<float>::infinity());
+    }
+    for (const auto& [placement, inside] : bodies) {
+        // A ray to a light inside the body ends there.
+        const float beyond = inside.depth > 0 && std::isfinite(ray.t_max) ? float(inside.depth) * ray.t_max : 0.0f;
+        passing *= exp(passages[placement].attenuation * -std::max(0.0f, inside.length + beyond));
+    }
+    return passing;
+}
+
+Rgb shadow_factor(const RayScene& scene, const LightSampler& lights, int light, const Ray& ray) {
+    const ShadowRules& rules = lights.lights()[std::size_t(light)].shadow;
+    if (!rules.is_enabled || rules.distance == 0.0f) return Rgb(1.0f);
+    const PlacementMask casters = lights.casters(light);
+    Ray within = ray;
+    if (rules.distance > 0.0f) within.t_max = std::min(ray.t_max, rules.distance);
+    if (!scene.is_occluded(within, casters)) return Rgb(1.0f);
+    Rgb passing = !scene.passages().empty() ? transmittance(scene, within, casters) : Rgb(0.0f);
+    if (rules.distance > 0.0f && rules.falloff > 0.0f) {
+        Hit hit;
+        const bool is_hit = scene.intersect(within, hit, casters);
+        const float strength = is_hit ? shadow_strength(rules, hit.t) : 0.0f;
+        passing = passing * strength + Rgb(1.0f - strength);
+    }
+    return passing + rules.color * (Rgb(1.0f) - passing);
+}
+
+void shadow_factors(const RayScene& scene, const LightSampler& lights, int light, std::span<const Ray> rays,
+                    std::span<Rgb> out) {
+    if (lights.has_plain_shadow(light)) {
+        plain_factors(scene, rays, out);
+        return;
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) out[i] = shadow_factor(scene, lights, light, rays[i]);
+}
+
+void shadow_factors(const RayScene& scene, const LightSampler& lights, std::span<const int> light,
+                    std::span<const Ray> rays, std::span<Rgb> out) {
+    const bool is_plain =
+        std::all_of(light.begin(), light.end(), [&](int index) { return lights.has_plain_shadow(index); });
+    if (is_plain) {
+        plain_factors(scene, rays, out);
+        return;
+    }
+    for (std::size_t i = 0; i < rays.size(); ++i) out[i] = shadow_factor(scene, lights, light[i], rays[i]);
+}
+
+}  // namespace frazil
