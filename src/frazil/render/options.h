@@ -26,6 +26,7 @@ struct RenderOptions {
     int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
     int bake_bounces = 1;        // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
+    std::vector<std::string> aovs;  // of the table, beside those that are made anyway
 };
 
 struct RenderStats {
