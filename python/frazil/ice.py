@@ -187,8 +187,10 @@ def preset_overlays(preset: IcePreset, scale: float = 1.0, **changes: Any) -> li
     """The preset's overlays, lengths times `scale`; `changes` are arguments of every Overlay."""
     made = []
     for row in preset.overlays:
-        values = {name: value * scale if name in _LENGTHS else value for name, value in row.items()}
-        made.append(Overlay(**(values | changes)))
+        overlay = Overlay(**(row | changes))
+        for name in _LENGTHS:
+            setattr(overlay, name, getattr(overlay, name) * scale)
+        made.append(overlay)
     return made
 
 
