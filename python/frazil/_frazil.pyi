@@ -956,6 +956,146 @@ class StandardMaterial:
 
     def __repr__(self) -> str: ...
 
+class Overlay:
+    """
+    A layer of cracks, frost, snow or dirt on ice. Lengths in metres, fractions in [0, 1].
+
+    Parameters
+    ----------
+    pattern : 'solid', 'fracture', 'cells', 'frost', 'bubbles', 'snow' or 'bands'.
+    color, opacity, roughness : of the layer where its mask is 1.
+    scattering : part of the light that it reflects diffusely, so that it does not enter.
+    bump : height where the mask is 1. internal : opacity of fracture planes seen inside the body.
+    age_begin, age_end : opacity grows from nothing to all of it between these ages.
+    size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.
+    feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.
+    amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.
+    mask : multiplies the pattern; a constant or a TextureLookup.
+
+    Ranges are checked when the scene is rendered.
+    """
+
+    def __init__(self, pattern: str = 'solid', *, color: Sequence[float] = [0.8999999761581421, 0.949999988079071, 1.0], opacity: float = 1.0, roughness: float = 0.5, scattering: float = 0.699999988079071, bump: float = 0.0, internal: float = 0.0, age_begin: float = 0.0, age_end: float = 1.0, size: float = 0.30000001192092896, width: float = 0.004000000189989805, feather: float = 0.004000000189989805, warp: float = 0.20000000298023224, scales: int = 2, amount: float = 0.5, slope: float = 0.0, direction: Sequence[float] = [0.0, 1.0, 0.0], seed: int = 0, mask: TextureLookup | float = 1.0) -> None: ...
+
+    @property
+    def pattern(self) -> str: ...
+
+    @property
+    def color(self) -> list[float]: ...
+
+    @color.setter
+    def color(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def opacity(self) -> float: ...
+
+    @opacity.setter
+    def opacity(self, arg: float, /) -> None: ...
+
+    @property
+    def roughness(self) -> float: ...
+
+    @roughness.setter
+    def roughness(self, arg: float, /) -> None: ...
+
+    @property
+    def scattering(self) -> float: ...
+
+    @scattering.setter
+    def scattering(self, arg: float, /) -> None: ...
+
+    @property
+    def bump(self) -> float: ...
+
+    @bump.setter
+    def bump(self, arg: float, /) -> None: ...
+
+    @property
+    def internal(self) -> float: ...
+
+    @internal.setter
+    def internal(self, arg: float, /) -> None: ...
+
+    @property
+    def age_begin(self) -> float: ...
+
+    @age_begin.setter
+    def age_begin(self, arg: float, /) -> None: ...
+
+    @property
+    def age_end(self) -> float: ...
+
+    @age_end.setter
+    def age_end(self, arg: float, /) -> None: ...
+
+    @property
+    def size(self) -> float: ...
+
+    @size.setter
+    def size(self, arg: float, /) -> None: ...
+
+    @property
+    def width(self) -> float: ...
+
+    @width.setter
+    def width(self, arg: float, /) -> None: ...
+
+    @property
+    def feather(self) -> float: ...
+
+    @feather.setter
+    def feather(self, arg: float, /) -> None: ...
+
+    @property
+    def warp(self) -> float: ...
+
+    @warp.setter
+    def warp(self, arg: float, /) -> None: ...
+
+    @property
+    def scales(self) -> int: ...
+
+    @scales.setter
+    def scales(self, arg: int, /) -> None: ...
+
+    @property
+    def amount(self) -> float: ...
+
+    @amount.setter
+    def amount(self, arg: float, /) -> None: ...
+
+    @property
+    def slope(self) -> float: ...
+
+    @slope.setter
+    def slope(self, arg: float, /) -> None: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @seed.setter
+    def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def direction(self) -> list[float]: ...
+
+    @direction.setter
+    def direction(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def mask(self) -> TextureLookup | float: ...
+
+    @mask.setter
+    def mask(self, arg: TextureLookup | float, /) -> None: ...
+
+    def eval(self, positions: numpy.typing.ArrayLike, normals: numpy.typing.ArrayLike, footprint: float = 0.0) -> list[float]:
+        """
+        The pattern's mask at positions (N, 3) with normals (N, 3), in metres of rest space, averaged over a
+        footprint of this radius; the texture mask is left out. A list of N floats.
+        """
+
+    def __repr__(self) -> str: ...
+
 class IceMaterial:
     """
     frazil:ice: a translucent core under a glossy dielectric boundary.
@@ -970,6 +1110,7 @@ class IceMaterial:
     volume : how much of the light scattered once inside is traced, in [0, 1].
     anisotropy : g of that light, in [-0.95, 0.95].
     priority : where bodies overlap, the highest fills the place.
+    overlays : list of Overlay, from below to the top; age : 0 = fresh .. 1 = old.
     tint : RGB factor on what leaves the core, or a TextureLookup.
     ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.
     ramp_preserve_energy : keep the total reflectance whatever the ramp.
@@ -981,7 +1122,7 @@ class IceMaterial:
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -1042,6 +1183,18 @@ class IceMaterial:
 
     @priority.setter
     def priority(self, arg: int, /) -> None: ...
+
+    @property
+    def overlays(self) -> list[Overlay]: ...
+
+    @overlays.setter
+    def overlays(self, arg: Sequence[Overlay], /) -> None: ...
+
+    @property
+    def age(self) -> float: ...
+
+    @age.setter
+    def age(self, arg: float, /) -> None: ...
 
     @property
     def spacing(self) -> float: ...

@@ -6,7 +6,7 @@ import pytest
 from pxr import Gf, Sdf, UsdGeom, UsdShade
 from usd_stages import TEXCOORDS, add_quad, load, new_stage, set_primvar
 
-from frazil.usd.material_inputs import ICE_INPUTS, ice_inputs_markdown
+from frazil.usd.material_inputs import ICE_INPUTS, inputs_markdown
 
 FLOAT, COLOR, TOKEN = Sdf.ValueTypeNames.Float, Sdf.ValueTypeNames.Color3f, Sdf.ValueTypeNames.Token
 
@@ -368,4 +368,4 @@ def test_the_table_of_inputs_is_the_one_in_the_docs():
     from pathlib import Path
 
     docs = (Path(__file__).parents[2] / "docs" / "usd.md").read_text(encoding="utf-8")
-    assert ice_inputs_markdown() in docs, "regenerate the table in docs/usd.md with ice_inputs_markdown()"
+    assert inputs_markdown() in docs, "regenerate the table in docs/usd.md with inputs_markdown()"

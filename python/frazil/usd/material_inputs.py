@@ -18,7 +18,7 @@ class MaterialInput:
     """
 
     name: str
-    kind: str  # float, int, color, bool, token, floats, colors
+    kind: str  # float, int, color, vector, bool, token, floats, colors
     default: object
     minimum: float = 0.0
     maximum: float = INFINITY
@@ -32,6 +32,8 @@ class MaterialInput:
         """The range in words: 'in 0..1', '>= 0'."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
+        if self.minimum == -INFINITY:
+            return ""
         if self.maximum != INFINITY:
             return f"in {self.minimum:g}..{self.maximum:g}"
         return f">= {self.minimum:g}"
@@ -90,6 +92,15 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("volume", "float", 0.0, 0.0, 1.0, meaning="how much of the light scattered once inside is traced"),
     MaterialInput("anisotropy", "float", 0.0, -0.95, 0.95, meaning="g of the light scattered once"),
     MaterialInput("priority", "int", 0, -1000, 1000, meaning="where bodies overlap, the highest fills the place"),
+    MaterialInput(
+        "preset",
+        "token",
+        "none",
+        choices=("none", "fresh_breath", "arctic_blue", "old_glacier", "weathered_white", "sea_ice"),
+        meaning="where inputs that are not authored take their values from, overlays too (docs/material.md)",
+    ),
+    MaterialInput("preset_scale", "float", 1.0, 1e-6, meaning="how much larger the preset's lengths are"),
+    MaterialInput("age", "float", 0.5, 0.0, 1.0, meaning="0 = fresh .. 1 = old: brings out the overlays"),
     MaterialInput("tint", "color", (1.0, 1.0, 1.0), takes_texture=True, meaning="multiplies what leaves the core"),
     MaterialInput(
         "ramp_distances", "floats", (), length_power=1, meaning="knots of the colour ramp, strictly increasing"
@@ -113,6 +124,56 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("compensation_limit", "float", 8.0, 1.0, meaning="largest gain"),
     MaterialInput("compensation_strength", "float", 1.0, 0.0, 1.0, meaning="0 = off, 1 = full"),
     MaterialInput("spacing", "float", 0.0, length_power=1, meaning="of the points; 0 = from the mean free path"),
+)
+
+# frazil:overlay, a shader whose output is connected to an input `overlays:NAME` of frazil:ice.
+OVERLAY_INPUTS: tuple[MaterialInput, ...] = (
+    MaterialInput(
+        "pattern",
+        "token",
+        "solid",
+        choices=("solid", "fracture", "cells", "frost", "bubbles", "snow", "bands"),
+        meaning="where the overlay is",
+    ),
+    MaterialInput(
+        "color", "color", (0.9, 0.95, 1.0), 0.0, 1.0, meaning="of what it scatters, and of what shines through"
+    ),
+    MaterialInput(
+        "opacity", "float", 1.0, 0.0, 1.0, meaning="where the mask is 1: hides what is seen through the surface"
+    ),
+    MaterialInput("roughness", "float", 0.5, 0.0, 1.0, meaning="of the surface there"),
+    MaterialInput(
+        "scattering", "float", 0.7, 0.0, 1.0, meaning="part of the light that it reflects, so that it does not enter"
+    ),
+    MaterialInput("bump", "float", 0.0, -INFINITY, length_power=1, meaning="height where the mask is 1"),
+    MaterialInput("internal", "float", 0.0, 0.0, 1.0, meaning="opacity of fracture planes inside, seen by refraction"),
+    MaterialInput("age_begin", "float", 0.0, 0.0, 1.0, meaning="age at which it begins to show"),
+    MaterialInput("age_end", "float", 1.0, 0.0, 1.0, meaning="age at which it has all of its opacity"),
+    MaterialInput(
+        "size",
+        "float",
+        0.3,
+        _SMALLEST_LENGTH,
+        length_power=1,
+        meaning="of cells, widest features of frost and snow, distance of planes, bands and bubbles",
+    ),
+    MaterialInput("width", "float", 0.004, length_power=1, meaning="of lines and bands, diameter of bubbles"),
+    MaterialInput("feather", "float", 0.004, length_power=1, meaning="over which a line's edge fades"),
+    MaterialInput("warp", "float", 0.2, 0.0, 4.0, meaning="how much lines are bent, of `size`"),
+    MaterialInput(
+        "scales", "int", 2, 0, 8, meaning="of cells, each 2.3 times finer; further octaves of frost and snow"
+    ),
+    MaterialInput("amount", "float", 0.5, 0.0, 1.0, meaning="how much of it there is"),
+    MaterialInput("slope", "float", 0.0, -1.0, 1.0, meaning="more frost where the surface faces `direction`, or away"),
+    MaterialInput(
+        "direction",
+        "vector",
+        (0.0, 1.0, 0.0),
+        -INFINITY,
+        meaning="up for snow and frost, across bands",
+    ),
+    MaterialInput("seed", "int", 0, 0, 2**31 - 1, meaning="another number, another pattern"),
+    MaterialInput("mask", "float", 1.0, 0.0, 1.0, takes_texture=True, meaning="multiplies the pattern"),
 )
 
 # UsdPreviewSurface 2.6: its own names, and the core's in snake_case.
@@ -150,14 +211,14 @@ def snake_case(name: str) -> str:
     return "".join("_" + c.lower() if c.isupper() else c for c in name)
 
 
-def ice_inputs_markdown() -> str:
-    """The table of frazil:ice as docs/usd.md shows it."""
+def inputs_markdown(table: tuple[MaterialInput, ...] = ICE_INPUTS) -> str:
+    """A table of inputs as the docs show it: frazil:ice in docs/usd.md, frazil:overlay in docs/material.md."""
     lines = ["| input | type | default | range | unit | meaning |", "|---|---|---|---|---|---|"]
-    types = {"color": "color3f", "floats": "float[]", "colors": "color3f[]"}
-    for row in ICE_INPUTS:
+    types = {"color": "color3f", "vector": "vector3f", "floats": "float[]", "colors": "color3f[]"}
+    for row in table:
         default = "–" if row.default is None or row.default == () else str(row.default)
         unit = {1: "scene unit", -1: "1/scene unit", 0: ""}[row.length_power]
-        if row.length_power and row.kind == "color" and row.default:
+        if row.length_power and row.kind in ("color", "float") and row.default:
             default += " m"
         texture = ", texture" if row.takes_texture else ""
         rule = "" if row.kind == "bool" else row.rule

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Tf, Usd, UsdShade
 
-from .._frazil import IceMaterial, Medium, Scene, StandardMaterial
+from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial
+from ..ice import find_preset, preset_medium, preset_overlays
 from .context import ReadContext
 from .material_inputs import (
     ICE_INPUTS,
+    OVERLAY_INPUTS,
     PREVIEW_IGNORED,
     PREVIEW_INPUTS,
     MaterialInput,
@@ -21,6 +23,8 @@ from .material_inputs import (
 from .shading import ShaderReader, Source
 
 ICE_SHADER = "frazil:ice"
+OVERLAY_SHADER = "frazil:overlay"
+_OVERLAY_PREFIX = "overlays:"
 
 # Inputs of shaders that Frazil does not know, and the input of UsdPreviewSurface that they come nearest to.
 _NEAREST_INPUTS = {
@@ -109,51 +113,83 @@ class MaterialReader:
 
     def _read_ice(self, shader: UsdShade.Shader):
         path = shader.GetPath()
-        self._warn_of_unknown_inputs(shader, ICE_INPUTS, frozenset())
+        self._warn_of_unknown_inputs(shader, ICE_INPUTS, frozenset(), _OVERLAY_PREFIX)
         sources = {row.name: self._shaders.read(shader, row.name) for row in ICE_INPUTS}
         values = {row.name: self._to_value(shader, row, sources[row.name]) for row in ICE_INPUTS}
+        name, scale = values.pop("preset"), values.pop("preset_scale")
+        preset = find_preset(name) if name != "none" else None
+        if preset is not None:
+            values |= {key: value for key, value in preset.inputs.items() if sources[key] is None}
+
+        medium = self._read_medium(path, sources, values, preset, scale)
+        overlays = preset_overlays(preset, scale, direction=self._up()) if preset is not None else []
+        authored, masks = self._read_overlays(shader)
+        values["ramp_distances"], values["ramp_colors"] = self._check_ramp(
+            path, values["ramp_distances"], values["ramp_colors"]
+        )
+        in_medium = ("albedo", "mean_free_path", "sigma_s_prime", "sigma_a", "eta")
+        model = IceMaterial(
+            medium,
+            overlays=overlays + authored,
+            **{key: value for key, value in values.items() if key not in in_medium},
+        )
+        return model, _texcoord_name(self._context, path, sources | masks)
+
+    def _read_medium(self, path, sources, values, preset, scale: float) -> Medium:
         has_sigma = sources["sigma_s_prime"] is not None or sources["sigma_a"] is not None
         has_albedo = sources["albedo"] is not None or sources["mean_free_path"] is not None
         if has_sigma and has_albedo:
             self._context.warn(
                 path, "has both albedo or mean_free_path and sigma_s_prime or sigma_a. The sigmas are used."
             )
+        if preset is not None and not has_albedo:
+            medium = preset_medium(preset, scale, values["eta"])
+            return Medium(
+                values["sigma_s_prime"] or medium.sigma_s_prime, values["sigma_a"] or medium.sigma_a, values["eta"]
+            )
         if has_sigma and values["sigma_s_prime"] is None:
             self._context.warn(path, "has sigma_a without sigma_s_prime. albedo and mean_free_path are used.")
             has_sigma = False
         if has_sigma:
             sigma_a = values["sigma_a"] or (0.0, 0.0, 0.0)
-            medium = Medium(values["sigma_s_prime"], sigma_a, values["eta"])
-        else:
-            medium = Medium.from_albedo(values["albedo"], values["mean_free_path"], values["eta"])
+            return Medium(values["sigma_s_prime"], sigma_a, values["eta"])
+        return Medium.from_albedo(values["albedo"], values["mean_free_path"], values["eta"])
 
-        distances, colors = self._check_ramp(path, values["ramp_distances"], values["ramp_colors"])
-        model = IceMaterial(
-            medium,
-            ramp_distances=distances,
-            ramp_colors=colors,
-            **{
-                name: values[name]
-                for name in (
-                    "roughness",
-                    "specular",
-                    "translucency",
-                    "refraction",
-                    "refraction_roughness",
-                    "volume",
-                    "anisotropy",
-                    "priority",
-                    "tint",
-                    "ramp_preserve_energy",
-                    "profile",
-                    "compensation",
-                    "compensation_limit",
-                    "compensation_strength",
-                    "spacing",
-                )
-            },
+    def _up(self) -> tuple[float, float, float]:
+        """The stage's up axis, in its own frame: patterns are read in the frames of its meshes."""
+        return (0.0, 0.0, 1.0) if self._context.is_z_up else (0.0, 1.0, 0.0)
+
+    def _read_overlays(self, ice: UsdShade.Shader) -> tuple[list[Overlay], dict[str, Source | None]]:
+        """The overlays that are connected, in the order of their inputs' names, and their texture masks."""
+        overlays: list[Overlay] = []
+        masks: dict[str, Source | None] = {}
+        connected = sorted(
+            (i for i in ice.GetInputs() if i.GetBaseName().startswith(_OVERLAY_PREFIX)), key=lambda i: i.GetBaseName()
         )
-        return model, _texcoord_name(self._context, path, sources)
+        for overlay_input in connected:
+            attributes = overlay_input.GetValueProducingAttributes()
+            shader = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
+            if not shader or shader.GetShaderId() != OVERLAY_SHADER:
+                self._context.warn(
+                    ice.GetPath(),
+                    f"{overlay_input.GetBaseName()} must be connected to a {OVERLAY_SHADER}. It is left out.",
+                )
+                continue
+            self._warn_of_unknown_inputs(shader, OVERLAY_INPUTS, frozenset())
+            sources = {row.name: self._shaders.read(shader, row.name) for row in OVERLAY_INPUTS}
+            values = {row.name: self._to_value(shader, row, sources[row.name]) for row in OVERLAY_INPUTS}
+            if sources["direction"] is None:
+                values["direction"] = self._up()
+            if values["age_end"] < values["age_begin"]:
+                self._context.warn(
+                    shader.GetPath(),
+                    f"age_end must be >= age_begin, {values['age_begin']:g}, got {values['age_end']:g}. "
+                    f"{values['age_begin']:g} is used.",
+                )
+                values["age_end"] = values["age_begin"]
+            overlays.append(Overlay(**values))
+            masks[str(shader.GetPath())] = sources["mask"]
+        return overlays, masks
 
     def _check_ramp(self, path, distances, colors):
         if len(distances) != len(colors):
@@ -220,9 +256,13 @@ class MaterialReader:
 
     # -- values
 
-    def _warn_of_unknown_inputs(self, shader, table: tuple[MaterialInput, ...], ignored: frozenset[str]) -> None:
+    def _warn_of_unknown_inputs(
+        self, shader, table: tuple[MaterialInput, ...], ignored: frozenset[str], prefix: str = ""
+    ) -> None:
         for shader_input in shader.GetInputs():
             name = shader_input.GetBaseName()
+            if prefix and name.startswith(prefix):
+                continue
             if find_input(table, name) is None and name not in ignored:
                 self._context.warn(
                     shader.GetPath(), f"has no input '{name}'. The nearest is '{nearest_name(table, name)}'."
@@ -260,7 +300,7 @@ class MaterialReader:
             array = np.repeat(array.reshape(1), 3)
         if row.kind == "float" and array.size == 3:
             array = array.reshape(3).mean()  # a colour where a number is wanted
-        width = {"float": 1, "int": 1, "color": 3, "floats": -1, "colors": 3}[row.kind]
+        width = {"float": 1, "int": 1, "color": 3, "vector": 3, "floats": -1, "colors": 3}[row.kind]
         array = array.reshape(-1, 3) if row.kind == "colors" else array.reshape(width)
         array = array * self._context.meters_per_unit**row.length_power
         if not np.isfinite(array).all():

@@ -202,6 +202,117 @@ void bind_standard(nb::module_& module) {
         });
 }
 
+constexpr std::pair<PatternKind, const char*> kPatternNames[] = {
+    {PatternKind::solid, "solid"}, {PatternKind::fracture, "fracture"}, {PatternKind::cells, "cells"},
+    {PatternKind::frost, "frost"}, {PatternKind::bubbles, "bubbles"},   {PatternKind::snow, "snow"},
+    {PatternKind::bands, "bands"}};
+
+void bind_overlay(nb::module_& module) {
+    const Overlay preset;
+    const Pattern& pattern = preset.pattern;
+    nb::class_<Overlay> cls(
+        module, "Overlay",
+        "A layer of cracks, frost, snow or dirt on ice. Lengths in metres, fractions in [0, 1].\n\n"
+        "Parameters\n----------\n"
+        "pattern : 'solid', 'fracture', 'cells', 'frost', 'bubbles', 'snow' or 'bands'.\n"
+        "color, opacity, roughness : of the layer where its mask is 1.\n"
+        "scattering : part of the light that it reflects diffusely, so that it does not enter.\n"
+        "bump : height where the mask is 1. internal : opacity of fracture planes seen inside the body.\n"
+        "age_begin, age_end : opacity grows from nothing to all of it between these ages.\n"
+        "size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.\n"
+        "feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.\n"
+        "amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.\n"
+        "mask : multiplies the pattern; a constant or a TextureLookup.\n\n"
+        "Ranges are checked when the scene is rendered.");
+    cls.def(
+        "__init__",
+        [](Overlay* self, const std::string& kind, const Triple& color, float opacity, float roughness,
+           float scattering, float bump, float internal, float age_begin, float age_end, float size, float width,
+           float feather, float warp, int scales, float amount, float slope, const Triple& direction,
+           std::uint32_t seed, const FloatInput& mask) {
+            Overlay made;
+            made.color = to_v3f(color);
+            made.opacity = opacity;
+            made.roughness = roughness;
+            made.scattering = scattering;
+            made.bump = bump;
+            made.internal = internal;
+            made.age_begin = age_begin;
+            made.age_end = age_end;
+            made.pattern = {from_name(kPatternNames, kind, "Overlay: pattern"),
+                            size,
+                            width,
+                            feather,
+                            warp,
+                            scales,
+                            amount,
+                            slope,
+                            to_v3f(direction),
+                            seed};
+            made.mask = to_input(mask);
+            new (self) Overlay(std::move(made));
+        },
+        "pattern"_a = "solid", nb::kw_only(), "color"_a = from_v3f(preset.color), "opacity"_a = preset.opacity,
+        "roughness"_a = preset.roughness, "scattering"_a = preset.scattering, "bump"_a = preset.bump,
+        "internal"_a = preset.internal, "age_begin"_a = preset.age_begin, "age_end"_a = preset.age_end,
+        "size"_a = pattern.size, "width"_a = pattern.width, "feather"_a = pattern.feather, "warp"_a = pattern.warp,
+        "scales"_a = pattern.scales, "amount"_a = pattern.amount, "slope"_a = pattern.slope,
+        "direction"_a = from_v3f(pattern.direction), "seed"_a = pattern.seed, "mask"_a = FloatInput(1.0f));
+    cls.def_prop_ro("pattern", [](const Overlay& o) { return to_name(kPatternNames, o.pattern.kind); })
+        .def_prop_rw(
+            "color", [](const Overlay& o) { return from_v3f(o.color); },
+            [](Overlay& o, const Triple& color) { o.color = to_v3f(color); })
+        .def_rw("opacity", &Overlay::opacity)
+        .def_rw("roughness", &Overlay::roughness)
+        .def_rw("scattering", &Overlay::scattering)
+        .def_rw("bump", &Overlay::bump)
+        .def_rw("internal", &Overlay::internal)
+        .def_rw("age_begin", &Overlay::age_begin)
+        .def_rw("age_end", &Overlay::age_end);
+    const auto def_pattern = [&](const char* name, auto Pattern::*member) {
+        using Value = std::remove_reference_t<decltype(std::declval<Pattern&>().*member)>;
+        cls.def_prop_rw(
+            name, [member](const Overlay& o) { return o.pattern.*member; },
+            [member](Overlay& o, Value value) { o.pattern.*member = value; });
+    };
+    def_pattern("size", &Pattern::size);
+    def_pattern("width", &Pattern::width);
+    def_pattern("feather", &Pattern::feather);
+    def_pattern("warp", &Pattern::warp);
+    def_pattern("scales", &Pattern::scales);
+    def_pattern("amount", &Pattern::amount);
+    def_pattern("slope", &Pattern::slope);
+    def_pattern("seed", &Pattern::seed);
+    cls.def_prop_rw(
+        "direction", [](const Overlay& o) { return from_v3f(o.pattern.direction); },
+        [](Overlay& o, const Triple& direction) { o.pattern.direction = to_v3f(direction); });
+    def_input(cls, "mask", &Overlay::mask);
+    cls.def(
+           "eval",
+           [](const Overlay& o, const FloatArray& positions, const FloatArray& normals, float footprint) {
+               const auto p = to_vectors3(positions, "Overlay.eval: positions");
+               const auto n = to_vectors3(normals, "Overlay.eval: normals");
+               if (p.size() != n.size()) {
+                   throw ValueError(
+                       str("Overlay.eval: normals must be as many as positions, ", p.size(), ", got ", n.size(), "."));
+               }
+               check_pattern(o.pattern, "Overlay");
+               std::vector<float> masks(p.size());
+               {
+                   nb::gil_scoped_release release;
+                   for (std::size_t i = 0; i < p.size(); ++i)
+                       masks[i] = eval_pattern(o.pattern, {p[i], n[i], footprint});
+               }
+               return masks;
+           },
+           "positions"_a, "normals"_a, "footprint"_a = 0.0f,
+           "The pattern's mask at positions (N, 3) with normals (N, 3), in metres of rest space, averaged over a\n"
+           "footprint of this radius; the texture mask is left out. A list of N floats.")
+        .def("__repr__", [](const Overlay& o) {
+            return str("Overlay('", to_name(kPatternNames, o.pattern.kind), "', opacity=", o.opacity, ")");
+        });
+}
+
 void bind_ice(nb::module_& module) {
     nb::class_<IceMaterial> cls(
         module, "IceMaterial",
@@ -215,6 +326,7 @@ void bind_ice(nb::module_& module) {
         "volume : how much of the light scattered once inside is traced, in [0, 1].\n"
         "anisotropy : g of that light, in [-0.95, 0.95].\n"
         "priority : where bodies overlap, the highest fills the place.\n"
+        "overlays : list of Overlay, from below to the top; age : 0 = fresh .. 1 = old.\n"
         "tint : RGB factor on what leaves the core, or a TextureLookup.\n"
         "ramp_distances, ramp_colors : knots of the colour ramp over distance, metres and RGB.\n"
         "ramp_preserve_energy : keep the total reflectance whatever the ramp.\n"
@@ -225,11 +337,12 @@ void bind_ice(nb::module_& module) {
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
-        [](IceMaterial* self, const Medium& medium, const std::string& profile, const FloatInput& roughness, float specular, float translucency,
-           float refraction, const std::optional<float>& refraction_roughness, float volume, float anisotropy,
-           int priority, const ColorInput& tint, const std::vector<float>& ramp_distances,
-           const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy, const std::string& compensation,
-           float compensation_limit, float compensation_strength, float spacing) {
+        [](IceMaterial* self, const Medium& medium, const std::string& profile, const FloatInput& roughness,
+           float specular, float translucency, float refraction, const std::optional<float>& refraction_roughness,
+           float volume, float anisotropy, int priority, const std::vector<Overlay>& overlays, float age,
+           const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
+           bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
+           float compensation_strength, float spacing) {
             IceMaterial model;
             model.medium = medium;
             model.roughness = to_input(roughness);
@@ -240,6 +353,8 @@ void bind_ice(nb::module_& module) {
             model.volume = volume;
             model.anisotropy = anisotropy;
             model.priority = priority;
+            model.overlays = overlays;
+            model.age = age;
             model.tint = to_input(tint);
             model.ramp = {ramp_distances, {}, ramp_preserve_energy};
             for (const Triple& color : ramp_colors) model.ramp.colors.push_back(to_v3f(color));
@@ -249,9 +364,10 @@ void bind_ice(nb::module_& module) {
             model.profile = profile_named(profile, "IceMaterial");
             new (self) IceMaterial(std::move(model));
         },
-        "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f), "specular"_a = 1.0f, "translucency"_a = 1.0f,
-        "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(), "volume"_a = 0.0f, "anisotropy"_a = 0.0f,
-        "priority"_a = 0, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
+        "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f),
+        "specular"_a = 1.0f, "translucency"_a = 1.0f, "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(),
+        "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "priority"_a = 0, "overlays"_a = std::vector<Overlay>(),
+        "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
         "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
         "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
     def_input(cls, "roughness", &IceMaterial::roughness);
@@ -272,6 +388,8 @@ void bind_ice(nb::module_& module) {
         .def_rw("volume", &IceMaterial::volume)
         .def_rw("anisotropy", &IceMaterial::anisotropy)
         .def_rw("priority", &IceMaterial::priority)
+        .def_rw("overlays", &IceMaterial::overlays)
+        .def_rw("age", &IceMaterial::age)
         .def_rw("spacing", &IceMaterial::spacing)
         .def_prop_ro("ramp_distances", [](const IceMaterial& model) { return model.ramp.distances; })
         .def_prop_ro("ramp_colors",
@@ -309,6 +427,7 @@ void bind_ice(nb::module_& module) {
 void bind_material(nb::module_& module) {
     bind_texture(module);
     bind_standard(module);
+    bind_overlay(module);
     bind_ice(module);
 }
 

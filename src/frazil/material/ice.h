@@ -6,6 +6,9 @@
 // Valid: roughness in [0,1], eta in [1,4], weights in [0,1], anisotropy in [-0.95, 0.95].
 #pragma once
 
+#include <vector>
+
+#include "frazil/material/overlay.h"
 #include "frazil/material/texture.h"
 #include "frazil/translucency/compensation.h"
 #include "frazil/translucency/medium.h"
@@ -24,11 +27,21 @@ struct IceMaterial {
     float refraction_roughness = -1.0f;      // of light that goes through the boundary, 0..1; below 0 = as roughness
     float volume = 0.0f;                     // how much of the light scattered once is traced, 0..1
     float anisotropy = 0.0f;                 // g of the once-scattered light (Henyey-Greenstein)
+    std::vector<Overlay> overlays;           // cracks, frost, snow ... from below to the top
+    float age = 0.5f;                        // 0 = fresh .. 1 = old: how much of its opacity each overlay has
     int priority = 0;                        // where bodies overlap, the highest fills the place
     MaterialInput<Rgb> tint{Rgb(1.0f), {}};  // multiplies what leaves the core
     Ramp ramp;
     Compensation compensation;
     float spacing = 0.0f;  // of the points, metres; 0 = from the mean free path
+
+    // Whether fracture planes may be seen inside.
+    bool has_sheets() const {
+        for (const Overlay& overlay : overlays) {
+            if (overlay.internal > 0.0f && overlay.pattern.kind == PatternKind::fracture) return true;
+        }
+        return false;
+    }
 };
 
 }  // namespace frazil

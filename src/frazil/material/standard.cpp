@@ -14,11 +14,6 @@ Rgb schlick_average(const Rgb& f0) {
     return f0 + (Rgb(1.0f) - f0) / 21.0f;
 }
 
-V3f cosine_hemisphere(const V2f& u) {
-    const float r = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
-    return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1.0f - u.x))};
-}
-
 }  // namespace
 
 StandardBsdf::StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color) {

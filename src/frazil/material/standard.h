@@ -52,6 +52,8 @@ class StandardBsdf {
     float pdf(const V3f& wo, const V3f& wi) const;
 
     const Rgb& emission() const { return emission_; }
+    // Of the specular lobe.
+    float alpha() const { return alpha_; }
     // 0 or 1 where the material has a threshold.
     float opacity() const { return opacity_; }
     // Fraction of light from wo that is reflected, per part; for AOVs and denoising.

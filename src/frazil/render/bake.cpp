@@ -99,6 +99,7 @@ std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ra
                                           const std::vector<std::unique_ptr<Body>>& bodies,
                                           const RenderOptions& options, std::vector<LitPoints>& lit, RenderStats& stats,
                                           Progress* progress) {
+    const SurfaceResolver resolver(scene);
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         Stopwatch watch(stats.seconds["bake"]);
@@ -111,6 +112,7 @@ std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ra
             progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;
+        keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), irradiance.values);
         lit[i].irradiance = std::move(irradiance.values);
     }
     add_bounces(scene, ray_scene, lights, options, bodies, lit, stats, progress);

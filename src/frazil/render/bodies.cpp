@@ -26,13 +26,12 @@ float Body::transmittance_average(float roughness) const {
 }
 
 Rgb Body::inner_radiance_per_exitance(const Surface& surface) const {
-    const float average = transmittance_average(eval_float(material->roughness, surface.st));
-    return eval_color(material->tint, surface.st) * (material->translucency * kInvPi / average);
+    const float average = transmittance_average(surface.covering.roughness);
+    return eval_color(material->tint, surface.st) * surface.covering.tint * (material->translucency * kInvPi / average);
 }
 
 Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
-    const float roughness = eval_float(material->roughness, surface.st);
-    return inner_radiance_per_exitance(surface) * transmittance(surface.normal.dot(wo), roughness);
+    return inner_radiance_per_exitance(surface) * transmittance(surface.normal.dot(wo), surface.covering.roughness);
 }
 
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {

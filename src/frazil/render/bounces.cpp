@@ -57,6 +57,12 @@ Rgb diffuse_albedo(const SurfaceResolver& resolver, const BounceHit& hit) {
 
 }  // namespace
 
+void keep_entering(const std::vector<float>& entering, std::vector<Rgb>& irradiance) {
+    if (entering.empty()) return;
+    const std::size_t groups = irradiance.size() / entering.size();
+    for (std::size_t k = 0; k < irradiance.size(); ++k) irradiance[k] *= entering[k / groups];
+}
+
 void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                  const RenderOptions& options, const std::vector<std::unique_ptr<Body>>& bodies,
                  std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress) {
@@ -86,7 +92,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;
             const IceMaterial& material = *bodies[i]->material;
-            const Irradiance brought = bake_bounce(
+            Irradiance brought = bake_bounce(
                 lit[i].points, ray_scene, groups,
                 [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                     add_ice(bodies, exitance, resolver, groups, hits, radiance);
@@ -96,6 +102,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
                 {std::max(1, options.bake_samples / 4), options.seed + static_cast<std::uint32_t>(bounce)}, progress);
             stats.bake_rays += brought.rays;
             stats.dropped_samples += brought.dropped_samples;
+            keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), brought.values);
             for (std::size_t k = 0; k < brought.values.size(); ++k) lit[i].irradiance[k] += brought.values[k];
             last[i] = brought.values;
         }

@@ -46,4 +46,12 @@ Ray camera_ray(const Camera& camera, float x, float y, float aspect) {
     return ray;
 }
 
+PixelCone pixel_cone(const Camera& camera, int width, int height) {
+    const float aspect = static_cast<float>(width) / static_cast<float>(height);
+    const Ray a = camera_ray(camera, 0.5f, 0.5f, aspect);
+    const Ray b = camera_ray(camera, 0.5f + 1.0f / static_cast<float>(width), 0.5f, aspect);
+    return {0.5f * (b.origin - a.origin).length(),
+            0.5f * (b.direction.normalized() - a.direction.normalized()).length()};
+}
+
 }  // namespace frazil

@@ -29,6 +29,12 @@ struct Camera {
 // Refuse apertures, focal lengths and clipping out of range: ValueError beginning with the camera's path.
 void check_camera(const Camera& camera);
 
+// What a pixel sees: a cone of this radius at the camera, growing by `spread` per metre.
+struct PixelCone {
+    float radius = 0.0f, spread = 0.0f;
+};
+PixelCone pixel_cone(const Camera& camera, int width, int height);
+
 // The ray through (x, y) in [0,1]² of the image, (0,0) its upper left corner; `aspect` = width / height of the image in
 // square pixels. The aperture is conformed to the aspect by expanding it (USD's expandAperture).
 Ray camera_ray(const Camera& camera, float x, float y, float aspect);

@@ -175,7 +175,8 @@ InsideOf Interiors::inside_at(const V3f& position) const {
     return inside;
 }
 
-Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs, bool* is_straight) const {
+Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs, bool* is_straight,
+                          float footprint) const {
     if (inside.is_empty()) {
         ++rays;
         if (!ray_scene_.is_occluded(ray)) return Rgb(1.0f);
@@ -197,12 +198,12 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
         if (!is_open_to_rays(hit.placement) || max_component(result) < kNothing) return Rgb(0.0f);
 
         const Crossing crossing = cross(hit, rest.direction, inside);
-        const Surface surface = resolver_.resolve(hit, rest.direction);
+        const Surface surface = resolver_.resolve(hit, rest.direction, footprint);
         if (crossing.is_boundary() && (crossing.from == InsideOf::kNone) != (crossing.to == InsideOf::kNone)) {
             const Body& ice = *bodies_[hit.placement];
             if (is_straight && !is_index_matched(ice.material->medium.eta)) *is_straight = false;
             const float cosine = std::abs(surface.normal.dot(rest.direction));
-            result *= ice.transmittance(cosine, eval_float(ice.material->roughness, surface.st));
+            result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
             // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
             const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
             const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));

@@ -75,9 +75,10 @@ class Interiors {
 
     // The part of the radiance (over squared index) at the end of the ray that comes straight through ice, without
     // bending: Fresnel's transmittance and the narrowing of solid angles at boundaries towards the air, scattering and
-    // absorption between, 0 behind anything else. `absorbs` = false leaves absorption out. `rays` counts what is traced; `is_straight` becomes false where a boundary would bend the ray.
+    // absorption between, 0 behind anything else. `absorbs` = false leaves absorption out. `rays` counts what is traced; `is_straight` becomes false where a boundary would bend the ray;
+    // overlays are averaged over `footprint`.
     Rgb visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs = true,
-                   bool* is_straight = nullptr) const;
+                   bool* is_straight = nullptr, float footprint = 0.0f) const;
 
   private:
     const Scene& scene_;

@@ -21,6 +21,12 @@ constexpr int kMaxTransparentHits = 64;
 constexpr int kMaxInnerBounces = 8, kMaxVolumePieces = 2;
 // A refracted path that is worth less than this goes on by chance only.
 constexpr float kFaint = 0.02f;
+// Overlays that cover less than this are not seen from below.
+constexpr float kHiding = 0.01f;
+// How much wider an opaque surface makes the cone that a path stands for, per metre.
+constexpr float kScatteredSpread = 0.05f;
+constexpr std::uint32_t kSheetDimensions = 16384;
+constexpr int kMaxSheets = 8;  // looked at on one piece of a path
 
 float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
@@ -40,9 +46,17 @@ V3f on_side(const V3f& direction, const V3f& normal, float sign) {
     return cosine > 0.0f ? direction : (direction - normal * (2.0f * sign * (cosine - 1e-5f))).normalized();
 }
 
-float refraction_alpha(const IceMaterial& ice, const V2f& st) {
-    return alpha_from_roughness(ice.refraction_roughness >= 0.0f ? ice.refraction_roughness
-                                                                 : eval_float(ice.roughness, st));
+// What goes through is blurred at least as the overlays blur the reflection.
+float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
+    const float roughness = surface.covering.roughness;
+    if (ice.refraction_roughness < 0.0f) return alpha_from_roughness(roughness);
+    const float bare = eval_float(ice.roughness, surface.st);
+    return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
+}
+
+// How much wider a lobe makes the cone that a path stands for, per metre.
+float lobe_spread(float alpha) {
+    return 0.5f * alpha;
 }
 
 }  // namespace
@@ -81,12 +95,15 @@ struct PathTracer::Path {
     bool has_passed = false;  // through a surface without a lobe, since then
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
-    bool has_direct_light = false;
+    bool has_direct_light = false, is_glossy = false;
+    bool sees_lamps = true;  // lights other than domes; not after reflections inside ice, where they would be sparks
     Rgb light_share = Rgb(1.0f);
 
     InsideOf inside;
     Core core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
+    float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
 
     // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
     Scattering weights(float diffuse, float specular, float refraction) const {
@@ -121,7 +138,8 @@ struct PathTracer::Path {
         if (!has_direct_light) return;
         for (int c = 0; c < 3; ++c) {
             const float all = last.diffuse[c] + last.specular[c] + last.refraction[c];
-            light_share[c] *= all > 0.0f ? 1.0f - last.diffuse[c] / all : 0.0f;
+            const float served = is_glossy ? last.diffuse[c] : last.diffuse[c] + last.specular[c];
+            light_share[c] *= all > 0.0f ? 1.0f - served / all : 0.0f;
         }
         has_direct_light = false;
     }
@@ -139,6 +157,12 @@ struct PathTracer::Path {
         ray.t_min = 0.0f;
         ray.t_max = std::numeric_limits<float>::infinity();
     }
+    // The next piece of the path begins inside ice at the end of the last.
+    void begin_piece(const Core& from, float volume_weight) {
+        core = from;
+        clear = core_share = 1.0f;
+        volume = volume_weight;
+    }
 
     // Straight on through a surface.
     void pass_through(const Surface& surface, float t) {
@@ -152,9 +176,14 @@ struct PathTracer::Path {
     void begin_vertex() { sampler.set_dimension(kDimensionsPerVertex * ++vertex); }
 };
 
+// Overlays on the way of light need no detail.
+float PathTracer::shadow_footprint(const Path& path) {
+    return 4.0f * path.width;
+}
+
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-                       const FilmLayout& layout, int max_bounces)
+                       const FilmLayout& layout, int max_bounces, const PixelCone& pixel)
     : scene_(scene),
       ray_scene_(ray_scene),
       lights_(lights),
@@ -165,7 +194,8 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       interiors_(scene, ray_scene, resolver_, bodies),
       single_scattering_(lights, interiors_, bodies),
       camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
-      max_bounces_(max_bounces) {}
+      max_bounces_(max_bounces),
+      pixel_(pixel) {}
 
 void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                        Tile& tile) const {
@@ -175,6 +205,8 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     path.receiver.position = camera_ray.origin;
     path.sampler = sampler;
     path.last.refraction = Rgb(1.0f);
+    path.width = pixel_.radius;
+    path.spread = pixel_.spread;
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
@@ -196,14 +228,24 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         Hit hit;
         ++tile.rays;
         const bool is_hit = ray_scene_.intersect(path.ray, hit);
-        const float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
+        float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
         path.begin_vertex();
+        V3f sheet_normal;
+        Rgb sheet_color;
+        const bool is_sheet = !path.inside.is_empty() && find_sheet(path, length, length, sheet_normal, sheet_color);
         if (!path.inside.is_empty() && !cross_interior(path, length, path.sampler, tile)) return;
+        if (is_sheet) {
+            path.width += path.spread * length;
+            const V3f position = path.ray.origin + path.ray.direction * length;
+            if (!meet_sheet(path, position, sheet_normal, sheet_color, tile)) return;
+            continue;
+        }
         add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
         if (!is_hit) return;
 
         const V3f wo = -path.ray.direction;
-        const Surface surface = resolver_.resolve(hit, path.ray.direction);
+        path.width += path.spread * length;
+        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
@@ -258,8 +300,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         float reflection_odds = 1.0f;
         if (body) {
-            const float leaving =
-                body->transmittance(surface.normal.dot(wo), eval_float(body->material->roughness, surface.st));
+            const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             Core core = core_at(surface, static_cast<int>(surface.object));
             core.is_primary = path.bounce == 0;
             add_entering_light(core, surface, *body, path.sampler);
@@ -273,7 +314,8 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
                 split = nullptr;
             } else {
                 // Either reflect or enter, by how much goes either way.
-                reflection_odds = std::clamp(1.0f - leaving, 0.05f, 0.95f);
+                reflection_odds =
+                    std::clamp(1.0f - leaving * (1.0f - luminance(surface.covering.reflectance)), 0.05f, 0.95f);
                 if (path.sampler.next_1d() >= reflection_odds) {
                     // The light that comes straight from lights is the reflection's, whichever way the path goes.
                     add_direct_light(path, surface, shader, wo, path.sampler, tile);
@@ -297,8 +339,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         path.receive(surface, surface.geometric_normal, LightUse::surface);
         ++path.scattered;
         path.is_delta = false;
-        path.has_direct_light = true;
+        path.has_direct_light = path.sees_lamps = true;
+        path.is_glossy = shader.is_glossy();
         path.light_share = Rgb(1.0f);
+        path.spread += kScatteredSpread;
         split = nullptr;
 
         // Russian roulette on what the path may still bring.
@@ -311,9 +355,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
         path.leave_from(surface.position, surface.geometric_normal, wi);
         if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
-            path.core = core_at(surface, filled);
-            path.clear = 1.0f;
-            path.volume = bodies_[std::size_t(filled)]->material->volume;
+            path.begin_piece(core_at(surface, filled), bodies_[std::size_t(filled)]->material->volume);
         }
     }
 }
@@ -345,6 +387,7 @@ void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& t
     }
     for (LightHit& hit : hits) {
         const Light& light = lights_.lights()[std::size_t(hit.light)];
+        if (path.bounce > 0 && !path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) continue;
         const bool is_mesh = std::holds_alternative<MeshLight>(light.shape);
         const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
@@ -388,10 +431,10 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     shadow.direction = sample.direction;
     shadow.t_max = sample.distance * (1.0f - 1e-4f);
     bool is_straight = true;
-    const Rgb visible = visibility(sample.light, shadow, path.inside, tile, is_straight);
+    const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
     if (visible == Rgb(0.0f)) return;
-    // Through a boundary only the diffuse lobe takes light along a straight line; what is seen in a glossy one is refracted.
-    if (!is_straight) specular_lobe = Rgb(0.0f);
+    // Through a boundary broad lobes take light along a straight line; what is seen in a glossy one is refracted.
+    if (!is_straight && shader.is_glossy()) specular_lobe = Rgb(0.0f);
 
     const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
     const Rgb light_over_pdf = sample.radiance * visible * (mis / sample.pdf);
@@ -410,9 +453,11 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
 
 // What is left of a light along a ray; `is_straight` becomes false where a boundary would bend it. Inside ice shadows are
 // plain.
-Rgb PathTracer::visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const {
+Rgb PathTracer::visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
+                           bool& is_straight) const {
     if (lights_.has_plain_shadow(light) || !inside.is_empty()) {
-        return interiors_.visibility(ray, inside, tile.rays, true, &is_straight);
+        // Overlays on the way of light need no detail.
+        return interiors_.visibility(ray, inside, tile.rays, true, &is_straight, shadow_footprint(path));
     }
     ++tile.rays;
     return shadow_factor(ray_scene_, lights_, light, ray);
@@ -435,7 +480,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     const float eta = interiors_.eta(crossing.to);
     const Frame frame(surface.normal);
     const BoundarySample sample =
-        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface.st), eta,
+        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface), eta,
                         interiors_.transmission(static_cast<int>(surface.object)), sampler.next_2d());
     if (!(sample.weight > 0.0f)) return false;
 
@@ -449,9 +494,12 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
         path.is_delta = true;
     }
     path.inside = crossing.beyond;
-    path.core = core;
-    path.clear = ice.refraction;
-    path.volume = ice.volume;
+    // What overlays cover is not seen through; what they scatter the core does not get, so that its share grows.
+    const float bare = 1.0f - surface.covering.covered;
+    path.begin_piece(core, ice.volume * bare);
+    path.clear = ice.refraction * bare;
+    path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
+    path.spread += lobe_spread(refraction_alpha(ice, surface));
     path.leave_from(surface.position, -surface.geometric_normal,
                     on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     return true;
@@ -468,7 +516,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
 
     Rgb once(0.0f);
     if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
-        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside};
+        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside, shadow_footprint(path)};
         const OnceScattered scattered = single_scattering_.sample(segment, sampler, tile.rays);
         once = scattered.share * path.volume;
         if (scattered.light >= 0 && scattered.radiance != Rgb(0.0f)) {
@@ -476,13 +524,101 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
                     scattered.radiance * path.volume, tile);
         }
     }
-    request_gather(path, path.core, Rgb(1.0f) - unscattered - once, tile);
+    request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
     path.last.scale(unscattered * exp(medium.sigma_a * -way));
-    path.clear = 1.0f;
+    path.clear = path.core_share = 1.0f;
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
     return left > 0.0f && path.survives(left / kFaint);
+}
+
+// The first fracture plane inside ice that stops the path: each in turn by the chance of its opacity.
+bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const {
+    const int body = interiors_.filling(path.inside);
+    if (body == InsideOf::kNone) return false;
+    const IceMaterial& ice = *bodies_[std::size_t(body)]->material;
+    if (!ice.has_sheets()) return false;
+    // Nothing is seen through so much ice.
+    const Rgb sigma = ice.medium.sigma_s_prime + ice.medium.sigma_a;
+    const float reach = std::min(length, 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f));
+    const auto object = static_cast<std::uint32_t>(body);
+    const V3f origin = path.ray.origin * resolver_.world_to_rest(object);
+    V3f direction;
+    resolver_.world_to_rest(object).multDirMatrix(path.ray.direction, direction);
+    Sampler coin = path.sampler;
+    coin.set_dimension(kSheetDimensions + 32U * path.vertex);
+    bool is_found = false;
+    for (const Overlay& overlay : ice.overlays) {
+        const float opacity = overlay.internal * age_weight(overlay, ice.age);
+        if (overlay.pattern.kind != PatternKind::fracture || !(opacity > 0.0f)) continue;
+        float begin = 0.5f * overlay.pattern.width + 1e-4f;
+        for (int k = 0; k < kMaxSheets; ++k) {
+            float met = 0.0f, mask = 0.0f;
+            V3f met_normal;
+            const float footprint = path.width + path.spread * begin;
+            if (!next_fracture(overlay.pattern, origin, direction, begin, is_found ? t : reach, footprint, met, mask,
+                               met_normal)) {
+                break;
+            }
+            if (coin.next_1d() < mask * opacity) {
+                t = met, color = overlay.color, is_found = true;
+                resolver_.rest_to_world(object).multDirMatrix(met_normal, normal);
+                break;
+            }
+            begin = met + 1e-4f * overlay.pattern.size;
+        }
+    }
+    return is_found;
+}
+
+// A fracture plane: a thin diffuse sheet that sends half of its light to either side.
+bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const {
+    const int body = interiors_.filling(path.inside);
+    const auto cosine_pdf = [&](const V3f& wi) { return 0.5f * kInvPi * std::abs(normal.dot(wi)); };
+    if (!lights_.is_empty()) {
+        const float u_pick = path.sampler.next_1d();
+        const LightReceiver receiver{position, V3f(0.0f), static_cast<std::uint32_t>(body)};
+        const LightSample sample = lights_.sample(receiver, u_pick, path.sampler.next_2d(), LightUse::refraction);
+        const float value = cosine_pdf(sample.direction);
+        if (sample.pdf > 0.0f && value > 0.0f) {
+            bool is_straight = true;
+            const Ray shadow{position, sample.direction, 0.0f, sample.distance * (1.0f - 1e-4f)};
+            const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
+            const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value);
+            const Light& light = lights_.lights()[std::size_t(sample.light)];
+            Scattering weights = path.weights();
+            weights.scale(color * (value * multiplier(light, LightComponent::refraction)));
+            deliver(path, Component::refraction, weights, group_of_light_[std::size_t(sample.light)],
+                    sample.radiance * visible * (mis / sample.pdf), tile);
+        }
+    }
+    if (path.scattered >= max_bounces_ || path.inner >= kMaxInnerBounces) {
+        Core core = path.core;
+        core.is_primary = false;
+        core.position = position;
+        request_gather(path, core, color, tile);
+        return false;
+    }
+    ++path.scattered, ++path.inner;
+    const float u_side = path.sampler.next_1d();
+    const V3f local = cosine_hemisphere(path.sampler.next_2d());
+    const V3f wi = Frame(u_side < 0.5f ? normal : -normal).to_world(local);
+    path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)});
+    path.receiver = {position, V3f(0.0f), static_cast<std::uint32_t>(body)};
+    path.use = LightUse::refraction;
+    path.has_passed = false;
+    path.is_delta = false;
+    path.has_direct_light = path.sees_lamps = true;
+    path.is_glossy = false;
+    path.light_share = Rgb(1.0f);
+    path.spread += kScatteredSpread;
+    path.ray = {position, wi};
+    Core core = path.core;
+    core.is_primary = false;
+    core.position = position;
+    path.begin_piece(core, bodies_[std::size_t(body)]->material->volume);
+    return true;
 }
 
 // From inside: light of the outside, then reflect or go through.
@@ -502,7 +638,13 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         return false;
     }
     ++path.inner;
-    const float alpha = refraction_alpha(ice, surface.st);
+    // What lies on the boundary is seen from below as the core sees it.
+    if (const float covered = surface.covering.covered; covered > kHiding) {
+        request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
+        path.last.scale(Rgb(1.0f - covered));
+        if (covered >= 1.0f) return false;
+    }
+    const float alpha = refraction_alpha(ice, surface);
     if (crossing.to == InsideOf::kNone) add_light_beyond(path, surface, crossing, alpha, sampler, tile);
 
     const Frame frame(surface.normal);
@@ -512,7 +654,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     if (sample.is_reflection) {
         path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
         path.receive(surface, V3f(0.0f), LightUse::refraction);
-        path.has_direct_light = false;
+        path.has_direct_light = path.sees_lamps = false;
         path.light_share = Rgb(1.0f);
         path.is_delta = true;
         path.leave_from(surface.position, surface.geometric_normal,
@@ -527,10 +669,8 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
                         on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     }
     const int body = interiors_.filling(path.inside);
-    if (body != InsideOf::kNone) {
-        path.core = core_at(surface, body);
-        path.volume = bodies_[std::size_t(body)]->material->volume;
-    }
+    path.spread += lobe_spread(alpha);
+    if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
     return true;
 }
 
@@ -554,10 +694,11 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
-    const Rgb visible = visibility(sample.light, shadow, crossing.beyond, tile, is_straight);
+    const Rgb visible = visibility(path, sample.light, shadow, crossing.beyond, tile, is_straight);
     if (visible == Rgb(0.0f) || !is_straight) return;
     const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
+    if (!path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) return;
     Scattering weights = path.weights();
     weights.scale(Rgb(value * multiplier(light, LightComponent::refraction)));
     // Before the first lobe the boundary itself is the first.
@@ -602,7 +743,7 @@ void PathTracer::add_entering_light(Core& core, const Surface& surface, const Bo
                      sample.distance * (1.0f - 1e-4f)};
     if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
     const Light& light = lights_.lights()[std::size_t(sample.light)];
-    const float entering = body.transmittance(cosine, eval_float(ice.roughness, surface.st));
+    const float entering = body.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
     core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
                     (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
     core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);

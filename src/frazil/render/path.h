@@ -29,7 +29,7 @@ class PathTracer {
     // Everything must outlive the tracer. `group_of_light` gives each light's index among the light groups.
     PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-               const FilmLayout& layout, int max_bounces);
+               const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {});
 
     // Trace one sample. `sampler` stands after the camera's own dimensions.
     void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
@@ -43,6 +43,7 @@ class PathTracer {
   private:
     struct Path;
     struct Core;
+    static float shadow_footprint(const Path& path);
     // Follow a path to its end; a part that is split off goes to `split`, where there is room for one.
     void follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
 
@@ -52,7 +53,8 @@ class PathTracer {
     void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
-    Rgb visibility(int light, const Ray& ray, const InsideOf& inside, Tile& tile, bool& is_straight) const;
+    Rgb visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
+                   bool& is_straight) const;
     void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,
                           Sampler& sampler, Tile& tile) const;
 
@@ -61,6 +63,8 @@ class PathTracer {
     bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const Core& core,
                Sampler& sampler) const;
     bool cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const;
+    bool find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const;
+    bool meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const;
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
     void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
@@ -79,6 +83,7 @@ class PathTracer {
     SingleScattering single_scattering_;
     InsideOf camera_inside_;
     int max_bounces_;
+    PixelCone pixel_;
 };
 
 }  // namespace frazil

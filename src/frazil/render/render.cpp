@@ -216,7 +216,8 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
 
     Stopwatch render_watch(stats.seconds["render"]);
     const std::vector<std::size_t> group_of_light = groups_of(scene.lights, layout.groups);
-    const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces);
+    const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces,
+                            pixel_cone(scene.camera, options.width, options.height));
     for (const std::string& warning : tracer.warnings()) stats.warnings.push_back(warning);
     const FilterSampler filter(options.filter);
     V3f view_axis;

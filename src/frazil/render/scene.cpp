@@ -22,6 +22,10 @@ void check_material(const Material& material) {
     require(ice->volume >= 0.0f && ice->volume <= 1.0f, "volume must be in 0..1", ice->volume);
     require(ice->anisotropy >= -0.95f && ice->anisotropy <= 0.95f, "anisotropy must be in -0.95..0.95",
             ice->anisotropy);
+    require(ice->age >= 0.0f && ice->age <= 1.0f, "age must be in 0..1", ice->age);
+    for (std::size_t i = 0; i < ice->overlays.size(); ++i) {
+        check_overlay(ice->overlays[i], str(material.path, ": overlay ", i));
+    }
     require(ice->compensation.limit >= 1.0f, "compensation_limit must be >= 1", ice->compensation.limit);
     require(ice->compensation.strength >= 0.0f && ice->compensation.strength <= 1.0f,
             "compensation_strength must be in 0..1", ice->compensation.strength);

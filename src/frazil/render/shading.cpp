@@ -8,9 +8,14 @@ Shader::Shader(const Surface& surface, const Body* body)
     : geometric_normal_(surface.geometric_normal), normal_(surface.normal), body_(body) {
     std::tie(tangent_, bitangent_) = tangent_frame(normal_);
     if (body_) {
-        alpha_ = alpha_from_roughness(eval_float(body_->material->roughness, surface.st));
-        core_albedo_ =
-            body_->total_reflectance * eval_color(body_->material->tint, surface.st) * body_->material->translucency;
+        const Covering& covering = surface.covering;
+        roughness_ = covering.roughness;
+        alpha_ = alpha_from_roughness(roughness_);
+        reflectance_ = covering.reflectance;
+        // No lobe starves; ice without overlays has but one.
+        if (reflectance_ != Rgb(0.0f)) diffuse_chance_ = std::clamp(0.9f * luminance(reflectance_) + 0.05f, 0.1f, 0.9f);
+        core_albedo_ = body_->total_reflectance * eval_color(body_->material->tint, surface.st) * covering.tint *
+                       (body_->material->translucency * (1.0f - covering.scattered));
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
         standard_.emplace(material, surface.st, surface.display_color);
@@ -24,7 +29,7 @@ Rgb Shader::albedo(const V3f& wo) const {
         return lobes.diffuse + lobes.specular;
     }
     const float reflected = body_->material->specular * body_->boundary->eval(std::max(0.0f, local_wo.z), alpha_);
-    return Rgb(reflected) + core_albedo_ * (1.0f - reflected);
+    return Rgb(reflected) + (core_albedo_ + reflectance_) * (1.0f - reflected);
 }
 
 Scattering Shader::eval(const V3f& wo, const V3f& wi) const {
@@ -36,12 +41,28 @@ Scattering Shader::eval(const V3f& wo, const V3f& wi) const {
         return {value.diffuse, value.specular, Rgb(0.0f), standard_->pdf(local_wo, local_wi)};
     }
     const float reflection = dielectric_reflection(local_wo, local_wi, alpha_, *body_->boundary);
-    return {Rgb(0.0f), Rgb(body_->material->specular * reflection), Rgb(0.0f), ggx_pdf(local_wo, local_wi, alpha_)};
+    Scattering value{Rgb(0.0f), Rgb(body_->material->specular * reflection), Rgb(0.0f),
+                     ggx_pdf(local_wo, local_wi, alpha_)};
+    if (diffuse_chance_ > 0.0f) {
+        // Overlays lie under the boundary: light passes it on the way in and on the way out, and is not lost between.
+        const float passes = body_->transmittance(local_wo.z, roughness_) *
+                             body_->transmittance(local_wi.z, roughness_) / body_->transmittance_average(roughness_);
+        value.diffuse = reflectance_ * (passes * local_wi.z * kInvPi);
+        value.pdf = (1.0f - diffuse_chance_) * value.pdf + diffuse_chance_ * local_wi.z * kInvPi;
+    }
+    return value;
 }
 
 bool Shader::sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const {
     const V3f local_wo = to_local(wo);
-    const V3f local_wi = standard_ ? standard_->sample(local_wo, u_lobe, u).wi : ggx_sample(local_wo, alpha_, u);
+    V3f local_wi;
+    if (standard_) {
+        local_wi = standard_->sample(local_wo, u_lobe, u).wi;
+    } else if (u_lobe < diffuse_chance_) {
+        local_wi = cosine_hemisphere(u);
+    } else {
+        local_wi = ggx_sample(local_wo, alpha_, u);
+    }
     if (!(local_wi.z > 0.0f)) return false;
     wi = to_world(local_wi);
     return geometric_normal_.dot(wi) > 0.0f;

@@ -1,6 +1,6 @@
 // How a surface scatters light: one face over the material models.
-// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection alone (its core answers by gather and
-//   by refracted rays: path.h).
+// Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection over the diffuse one of its overlays (its
+//   core answers by gather and by refracted rays: path.h).
 // Units: f * cos per steradian.
 // Valid: reflection only: zero where a direction is below the geometric surface.
 #pragma once
@@ -31,6 +31,8 @@ class Shader {
 
     // The fraction of light that the surface stops: 1 but for cut-out standard materials.
     float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
+    // Whether what is seen in the reflection has edges, so that light through ice must be bent in it.
+    bool is_glossy() const { return (standard_ ? standard_->alpha() : alpha_) < kGlossyAlpha; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
     // The share of light from all around that goes towards wo, all lobes together.
@@ -41,14 +43,16 @@ class Shader {
     bool sample(const V3f& wo, float u_lobe, const V2f& u, V3f& wi) const;
 
   private:
+    static constexpr float kGlossyAlpha = 0.1f;
     V3f to_local(const V3f& v) const { return {v.dot(tangent_), v.dot(bitangent_), v.dot(normal_)}; }
     V3f to_world(const V3f& v) const { return tangent_ * v.x + bitangent_ * v.y + normal_ * v.z; }
 
     V3f geometric_normal_, normal_, tangent_, bitangent_;
     std::optional<StandardBsdf> standard_;
     const Body* body_ = nullptr;
-    float alpha_ = 0.0f;           // of the ice's boundary
-    Rgb core_albedo_ = Rgb(0.0f);  // of the ice under its boundary
+    // Of ice: its boundary, the core under it, and what its overlays scatter.
+    float alpha_ = 0.0f, roughness_ = 0.0f, diffuse_chance_ = 0.0f;
+    Rgb core_albedo_ = Rgb(0.0f), reflectance_ = Rgb(0.0f);
 };
 
 }  // namespace frazil

@@ -1,5 +1,7 @@
 #include "frazil/render/surface.h"
 
+#include "frazil/base/parallel.h"
+
 namespace frazil {
 namespace {
 
@@ -38,14 +40,70 @@ V3f mapped_normal(const Surface& surface, const Object& object, const Mesh& mesh
     return n.length2() > 0.0f ? n.normalized() : surface.normal;
 }
 
+// The rotation (and mirroring) of a matrix, its scale and shear left out: the orthogonal part of its polar decomposition by
+// Newton's iteration, with the matrix's translation.
+M44f rigid_part(const M44f& matrix) {
+    M44f m = matrix;
+    m[3][0] = m[3][1] = m[3][2] = 0.0f;
+    for (int step = 0; step < 30; ++step) {
+        const M44f inverse = m.inverse();
+        const M44f next = (m + inverse.transposed()) * 0.5f;
+        float change = 0.0f;
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) change = std::max(change, std::abs(next[i][j] - m[i][j]));
+        }
+        m = next;
+        if (change < 1e-6f) break;
+    }
+    m[3][0] = matrix[3][0], m[3][1] = matrix[3][1], m[3][2] = matrix[3][2], m[3][3] = 1.0f;
+    return m;
+}
+
 }  // namespace
 
 SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
-    world_to_local_.reserve(scene.objects.size());
-    for (const Object& object : scene.objects) world_to_local_.push_back(object.local_to_world.inverse());
+    frames_.reserve(scene.objects.size());
+    for (const Object& object : scene.objects) {
+        const M44f rigid = rigid_part(object.local_to_world);
+        frames_.push_back({object.local_to_world.inverse(), rigid.inverse(), rigid});
+    }
 }
 
-Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction) const {
+Covering SurfaceResolver::covering(const IceMaterial& ice, std::uint32_t object, const V3f& position, const V3f& normal,
+                                   const V2f& st, float footprint, bool with_bump) const {
+    const float roughness = eval_float(ice.roughness, st);
+    if (ice.overlays.empty()) {
+        Covering bare;
+        bare.roughness = roughness;
+        return bare;
+    }
+    PatternPoint point;
+    point.position = position * world_to_rest(object);
+    world_to_rest(object).multDirMatrix(normal, point.normal);
+    point.footprint = footprint;
+    return eval_overlays(ice.overlays, ice.age, roughness, point, st, with_bump);
+}
+
+std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSet& points) const {
+    const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
+    if (!ice || ice->overlays.empty()) return {};
+    const Mesh& mesh = scene_.meshes[scene_.objects[object].mesh];
+    std::vector<float> result(points.size());
+    parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const auto triangle = static_cast<std::uint32_t>(points.triangles[k]);
+            const V2f st =
+                mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, triangle, points.barycentrics[k]);
+            // A point stands for a disc of its area.
+            const float footprint = std::sqrt(points.areas[k] * kInvPi);
+            result[k] =
+                1.0f - covering(*ice, object, points.positions[k], points.normals[k], st, footprint, false).scattered;
+        }
+    });
+    return result;
+}
+
+Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float footprint, bool with_bump) const {
     const Object& object = scene_.objects[hit.placement];
     const Mesh& mesh = scene_.meshes[object.mesh];
     Surface surface;
@@ -63,8 +121,8 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction) const {
     surface.geometric_normal = towards(hit.geometric_normal, wo);
     surface.normal = surface.geometric_normal;
     if (!mesh.normals.is_empty()) {
-        const V3f normal =
-            transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local_[hit.placement]);
+        const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv),
+                                            frames_[hit.placement].world_to_local);
         if (is_finite(normal) && normal.length2() > 0.0f) {
             surface.normal = bent_towards_viewer(towards(normal, surface.geometric_normal), wo);
         }
@@ -75,6 +133,18 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction) const {
     if (standard && standard->normal.texture && !mesh.uvs.is_empty()) {
         const V3f mapped = mapped_normal(surface, object, mesh, hit, eval_normal(standard->normal, surface.st));
         surface.normal = bent_towards_viewer(mapped, wo);
+    }
+    if (const auto* ice = std::get_if<IceMaterial>(&surface.material->model)) {
+        // Patterns see the surface from outside, whichever side the viewer is on.
+        const V3f outside = surface.normal * (hit.geometric_normal.dot(surface.geometric_normal) < 0.0f ? -1.0f : 1.0f);
+        surface.covering = covering(*ice, hit.placement, surface.position, outside, surface.st, footprint, with_bump);
+        if (surface.covering.slope != V3f(0.0f)) {
+            V3f slope;
+            rest_to_world(hit.placement).multDirMatrix(surface.covering.slope, slope);
+            slope -= outside * outside.dot(slope);
+            const V3f tilted = towards((outside - slope).normalized(), surface.geometric_normal);
+            surface.normal = bent_towards_viewer(tilted, wo);
+        }
     }
     return surface;
 }

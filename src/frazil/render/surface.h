@@ -1,12 +1,15 @@
 // What a ray has hit: the place, its normals and its texture coordinates, ready for shading.
-// Model: two-sided: the normals turn towards the viewer. The shading normal is bent until the viewer is above it.
+// Model: two-sided: the normals turn towards the viewer. The shading normal is bent until the viewer is above it. Patterns
+//   are read in rest space: the object's own frame under its scale, without its rotation and place, so that their widths
+//   are metres and they stay with a moving object.
 // Units: metres, world space.
-// Not: derivatives (textures are read without a footprint).
+// Not: derivatives of texture coordinates (textures are read without a footprint).
 #pragma once
 
 #include <vector>
 
 #include "frazil/geometry/ray_scene.h"
+#include "frazil/points/point_set.h"
 #include "frazil/render/scene.h"
 
 namespace frazil {
@@ -20,6 +23,7 @@ struct Surface {
     V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
     V3f local_position = V3f(0.0f);    // in the mesh's own space
     Rgb display_color = Rgb(0.18f);
+    Covering covering;  // of ice: its overlays, with the roughness that they leave
 };
 
 // Resolves hits into surfaces; holds what that needs per object.
@@ -27,12 +31,26 @@ class SurfaceResolver {
   public:
     explicit SurfaceResolver(const Scene& scene);
 
-    // `direction` is the ray's, towards the surface.
-    Surface resolve(const Hit& hit, const V3f& direction) const;
+    // `direction` is the ray's, towards the surface; `footprint` the radius of what the ray stands for, metres. Bump is left
+    // out where the surface only lets light pass.
+    Surface resolve(const Hit& hit, const V3f& direction, float footprint = 0.0f, bool with_bump = false) const;
+
+    // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
+    std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
+
+    // World space to the object's rest space and back: rigid, perhaps mirrored.
+    const M44f& world_to_rest(std::uint32_t object) const { return frames_[object].world_to_rest; }
+    const M44f& rest_to_world(std::uint32_t object) const { return frames_[object].rest_to_world; }
 
   private:
+    struct Frames {
+        M44f world_to_local, world_to_rest, rest_to_world;
+    };
+    Covering covering(const IceMaterial& ice, std::uint32_t object, const V3f& position, const V3f& normal,
+                      const V2f& st, float footprint, bool with_bump) const;
+
     const Scene& scene_;
-    std::vector<M44f> world_to_local_;
+    std::vector<Frames> frames_;
 };
 
 }  // namespace frazil

@@ -113,8 +113,9 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
         const V3f place = segment.origin + segment.direction * t;
         const LightSample towards = lights_.sample_one(result.light, place, u_direction);
         if (towards.pdf > 0.0f && density > 0.0f) {
-            const Rgb reaches = interiors_.visibility(
-                {place, towards.direction, 0.0f, towards.distance * (1.0f - 1e-4f)}, segment.inside, rays);
+            const Rgb reaches =
+                interiors_.visibility({place, towards.direction, 0.0f, towards.distance * (1.0f - 1e-4f)},
+                                      segment.inside, rays, true, nullptr, segment.footprint);
             // Light travels along -towards.direction before and -segment.direction after.
             const float phase = henyey_greenstein(towards.direction.dot(segment.direction), ice.anisotropy);
             result.radiance = sigma_s * exp(sigma_t * -t) * reaches * towards.radiance *
@@ -128,7 +129,8 @@ OnceScattered SingleScattering::sample(const Segment& segment, Sampler& sampler,
     if (density > 0.0f) {
         const V3f place = segment.origin + segment.direction * t;
         const V3f away = -sample_henyey_greenstein(-segment.direction, ice.anisotropy, u_phase);
-        const Rgb leaves = interiors_.visibility({place, away}, segment.inside, rays, false);
+        const Rgb leaves =
+            interiors_.visibility({place, away}, segment.inside, rays, false, nullptr, segment.footprint);
         result.share = sigma_s * exp(sigma_s * -t) * leaves / density;
     }
     return result;

@@ -25,6 +25,7 @@ struct Segment {
     V3f direction = V3f(0.0f);  // unit length, away from the viewer
     float length = 0.0f;        // metres; may be infinite
     InsideOf inside;            // of which the origin is; not empty
+    float footprint = 0.0f;     // over which overlays on the way of light are averaged, metres
 };
 
 // One random sample of what is scattered once on a segment.

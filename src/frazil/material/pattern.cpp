@@ -1,0 +1,253 @@
+#include "frazil/material/pattern.h"
+
+#include <cmath>
+
+#include "frazil/base/error.h"
+#include "frazil/base/random.h"
+
+namespace frazil {
+namespace {
+
+constexpr int kPlaneFamilies = 4;
+// Lines at a flat angle to the surface are widened no further than this.
+constexpr float kLeastSine = 0.25f;
+
+float smooth_step(float low, float high, float x) {
+    const float t = std::clamp((x - low) / std::max(high - low, 1e-9f), 0.0f, 1.0f);
+    return t * t * (3.0f - 2.0f * t);
+}
+
+// From the distance to a sheet in space to the distance along the surface that cuts it.
+float along_surface(float distance, const V3f& sheet_normal, const V3f& surface_normal) {
+    if (surface_normal == V3f(0.0f)) return distance;
+    const float cosine = sheet_normal.dot(surface_normal);
+    return distance / std::max(std::sqrt(std::max(0.0f, 1.0f - cosine * cosine)), kLeastSine);
+}
+
+V3f axis_of(const Pattern& pattern) {
+    return pattern.direction.length2() > 0.0f ? pattern.direction.normalized() : V3f(0, 1, 0);
+}
+
+float facing(const Pattern& pattern, const PatternPoint& at) {
+    return at.normal.dot(axis_of(pattern));
+}
+
+V3f family_normal(std::uint32_t seed, int family) {
+    const std::uint32_t h = hash(seed, std::uint32_t(family), 7U);
+    const float z = 2.0f * to_unit_float(h) - 1.0f, phi = 2.0f * kPi * to_unit_float(hash(h));
+    const float r = std::sqrt(std::max(0.0f, 1.0f - z * z));
+    return {r * std::cos(phi), z, r * std::sin(phi)};
+}
+
+// Planes of one family stand `size` times the number of families apart, each moved at random, bent by smooth noise and cut
+// off where a noise of its own falls short.
+struct PlaneFamily {
+    PlaneFamily(const Pattern& pattern, int family)
+        : normal(family_normal(pattern.seed, family)),
+          pitch(pattern.size * kPlaneFamilies),
+          seed(hash(pattern.seed, std::uint32_t(family))) {}
+
+    float offset(int i) const { return (float(i) + 0.7f * to_unit_float(hash(seed, std::uint32_t(i)))) * pitch; }
+    // The height over the unbent family, in metres.
+    float height(const Pattern& pattern, const V3f& p) const {
+        float h = p.dot(normal);
+        if (pattern.warp > 0.0f) h += pattern.warp * pattern.size * gradient_noise(p / (1.7f * pattern.size), seed);
+        return h;
+    }
+    // How much of the plane i is there at p.
+    float extent(const Pattern& pattern, const V3f& p, int i, float footprint) const {
+        if (pattern.amount >= 1.0f) return 1.0f;
+        const float n = 0.5f + 0.6f * fractal_noise(p / (2.5f * pattern.size), 3, footprint / (2.5f * pattern.size),
+                                                    seed + 31U * std::uint32_t(i));
+        return smooth_step(1.0f - pattern.amount - 0.04f, 1.0f - pattern.amount + 0.12f, n);
+    }
+
+    V3f normal;
+    float pitch;
+    std::uint32_t seed;
+};
+
+float fracture_mask(const Pattern& pattern, const PatternPoint& at) {
+    float left = 1.0f;
+    for (int family = 0; family < kPlaneFamilies; ++family) {
+        const PlaneFamily planes(pattern, family);
+        const float h = planes.height(pattern, at.position);
+        const int nearest = int(std::floor(h / planes.pitch));
+        for (int i = nearest - 1; i <= nearest + 1; ++i) {
+            const float distance = along_surface(std::abs(h - planes.offset(i)), planes.normal, at.normal);
+            const float line = line_mask(distance, pattern.width, pattern.feather, at.footprint);
+            if (line > 0.0f) left *= 1.0f - line * planes.extent(pattern, at.position, i, at.footprint);
+        }
+    }
+    return 1.0f - left;
+}
+
+float cells_mask(const Pattern& pattern, const PatternPoint& at) {
+    float left = 1.0f, size = pattern.size, width = pattern.width, feather = pattern.feather;
+    for (int scale = 0; scale < std::max(1, pattern.scales); ++scale) {
+        const std::uint32_t seed = pattern.seed + 101U * std::uint32_t(scale);
+        V3f place = at.position / size;
+        if (pattern.warp > 0.0f) {
+            const V3f bent = vector_noise(place * 1.3f, seed + 1U), fine = vector_noise(place * 5.1f, seed + 4U);
+            place += (bent + fine * 0.25f) * pattern.warp;
+        }
+        // Flat angles widen a line, and the footprint its edge.
+        const float reach = (0.5f * (width + feather) + at.footprint) / size;
+        const CellWall wall = nearest_cell_wall(place, reach, seed);
+        if (!(wall.distance < 1e30f)) {
+            size /= 2.3f, width /= 1.7f, feather /= 1.7f;
+            continue;
+        }
+        const float distance = along_surface(wall.distance * size, wall.normal, at.normal);
+        const float line = line_mask(distance, width, feather, at.footprint);
+        if (line > 0.0f) {
+            // Some walls are open cracks, some are closed.
+            const float chance = to_unit_float(hash(wall.id, 5U));
+            left *= 1.0f - line * smooth_step(1.0f - pattern.amount - 0.2f, 1.0f - pattern.amount + 0.2f, chance);
+        }
+        size /= 2.3f, width /= 1.7f, feather /= 1.7f;
+    }
+    return 1.0f - left;
+}
+
+float frost_mask(const Pattern& pattern, const PatternPoint& at) {
+    const V3f place = at.position / pattern.size;
+    const float footprint = at.footprint / pattern.size;
+    const int octaves = 1 + std::max(0, pattern.scales);
+    V3f bent = place;
+    if (pattern.warp > 0.0f) {
+        bent += vector_noise(place, pattern.seed + 11U) * pattern.warp;
+    }
+    const float growth = fractal_noise(bent, octaves + 2, footprint, pattern.seed);
+    // Crystals: fine ridges within the growth.
+    const float ridge =
+        1.0f - 2.0f * std::abs(fractal_noise(bent * 6.0f, octaves, footprint * 6.0f, pattern.seed + 50U));
+    const float level = 0.5f + 0.55f * growth + 0.18f * ridge + 0.5f * pattern.slope * facing(pattern, at);
+    const float threshold = 1.15f - 1.1f * pattern.amount, soft = 0.16f + std::min(footprint, 0.5f);
+    return smooth_step(threshold - soft, threshold + soft, level);
+}
+
+float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
+    const V3f place = at.position / pattern.size;
+    const int x = int(std::floor(place.x)), y = int(std::floor(place.y)), z = int(std::floor(place.z));
+    float left = 1.0f;
+    for (int k = -1; k <= 1; ++k) {
+        for (int j = -1; j <= 1; ++j) {
+            for (int i = -1; i <= 1; ++i) {
+                const std::uint32_t h = cell_hash(x + i, y + j, z + k, pattern.seed + 77U);
+                if (to_unit_float(hash(h, 3U)) > pattern.amount) continue;
+                const V3f center = cell_point(x + i, y + j, z + k, pattern.seed) * pattern.size;
+                const float diameter = pattern.width * (0.35f + 0.65f * to_unit_float(hash(h, 4U)));
+                // A spot fades in both directions across a footprint that is wider than it.
+                const float blur = at.footprint + 0.5f * pattern.feather;
+                const float fading = std::min(1.0f, diameter / std::max(2.0f * blur, 1e-9f));
+                left *=
+                    1.0f - fading * line_mask((center - at.position).length(), diameter, pattern.feather, at.footprint);
+            }
+        }
+    }
+    return 1.0f - left;
+}
+
+float snow_mask(const Pattern& pattern, const PatternPoint& at) {
+    const V3f place = at.position / pattern.size;
+    const float n = fractal_noise(place, 2 + std::max(0, pattern.scales), at.footprint / pattern.size, pattern.seed);
+    const float steep = 1.0f - pattern.amount;
+    return smooth_step(steep - 0.12f, steep + 0.12f, facing(pattern, at) + 0.35f * n);
+}
+
+float bands_mask(const Pattern& pattern, const PatternPoint& at) {
+    const V3f axis = axis_of(pattern);
+    float height = at.position.dot(axis);
+    if (pattern.warp > 0.0f) {
+        height +=
+            pattern.warp * pattern.size *
+            fractal_noise(at.position / (4.0f * pattern.size), 4, at.footprint / (4.0f * pattern.size), pattern.seed);
+    }
+    const int nearest = int(std::floor(height / pattern.size));
+    float left = 1.0f;
+    for (int i = nearest - 1; i <= nearest + 1; ++i) {
+        const std::uint32_t h = hash(pattern.seed, std::uint32_t(i), 9U);
+        if (to_unit_float(h) > pattern.amount) continue;
+        const float middle = (float(i) + to_unit_float(hash(h))) * pattern.size;
+        const float width = pattern.width * (0.3f + 1.4f * to_unit_float(hash(h, 2U)));
+        const float line =
+            line_mask(along_surface(std::abs(height - middle), axis, at.normal), width, pattern.feather, at.footprint);
+        left *= 1.0f - line * (0.4f + 0.6f * to_unit_float(hash(h, 3U)));
+    }
+    return 1.0f - left;
+}
+
+}  // namespace
+
+float line_mask(float distance, float width, float feather, float footprint) {
+    const float half = 0.5f * width, reach = std::max(footprint + 0.5f * feather, 1e-9f);
+    const float overlap = std::min(distance + reach, half) - std::max(distance - reach, -half);
+    return std::clamp(overlap / (2.0f * reach), 0.0f, 1.0f);
+}
+
+void check_pattern(const Pattern& pattern, const std::string& path) {
+    const auto require = [&](bool holds, const char* rule, double value) {
+        if (!holds) throw ValueError(str(path, ": ", rule, ", got ", value, ". Mend the overlay's input."));
+    };
+    require(std::isfinite(pattern.size) && pattern.size > 0.0f, "size must be > 0", pattern.size);
+    require(std::isfinite(pattern.width) && pattern.width >= 0.0f, "width must be >= 0", pattern.width);
+    require(std::isfinite(pattern.feather) && pattern.feather >= 0.0f, "feather must be >= 0", pattern.feather);
+    require(pattern.warp >= 0.0f && pattern.warp <= 4.0f, "warp must be in 0..4", pattern.warp);
+    require(pattern.scales >= 0 && pattern.scales <= 8, "scales must be in 0..8", pattern.scales);
+    require(pattern.amount >= 0.0f && pattern.amount <= 1.0f, "amount must be in 0..1", pattern.amount);
+    require(pattern.slope >= -1.0f && pattern.slope <= 1.0f, "slope must be in -1..1", pattern.slope);
+    require(is_finite(pattern.direction), "direction must be finite", pattern.direction.x);
+}
+
+float eval_pattern(const Pattern& pattern, const PatternPoint& point) {
+    switch (pattern.kind) {
+        case PatternKind::solid:
+            return 1.0f;
+        case PatternKind::fracture:
+            return fracture_mask(pattern, point);
+        case PatternKind::cells:
+            return cells_mask(pattern, point);
+        case PatternKind::frost:
+            return frost_mask(pattern, point);
+        case PatternKind::bubbles:
+            return bubbles_mask(pattern, point);
+        case PatternKind::snow:
+            return snow_mask(pattern, point);
+        case PatternKind::bands:
+            return bands_mask(pattern, point);
+    }
+    return 0.0f;
+}
+
+bool next_fracture(const Pattern& pattern, const V3f& origin, const V3f& direction, float t_min, float t_max,
+                   float footprint, float& t, float& mask, V3f& normal) {
+    bool is_found = false;
+    for (int family = 0; family < kPlaneFamilies; ++family) {
+        const PlaneFamily planes(pattern, family);
+        const float speed = direction.dot(planes.normal);
+        if (std::abs(speed) < 1e-3f) continue;
+        // A bent plane is met within so much of where a straight one would be.
+        const float margin = pattern.warp * pattern.size / std::abs(speed), base = origin.dot(planes.normal);
+        const int step = speed > 0.0f ? 1 : -1;
+        const int first = int(std::floor((base + speed * t_min) / planes.pitch)) - 2 * step;
+        for (int k = 0; k < 64; ++k) {
+            const int i = first + step * k;
+            const float straight = (planes.offset(i) - base) / speed, limit = is_found ? t : t_max;
+            if (straight + margin <= t_min) continue;
+            if (straight - margin >= limit) break;
+            float s = straight;
+            for (int refine = 0; refine < (pattern.warp > 0.0f ? 4 : 0); ++refine) {
+                s += (planes.offset(i) - planes.height(pattern, origin + direction * s)) / speed;
+            }
+            if (s <= t_min || s >= limit) continue;
+            const float there = planes.extent(pattern, origin + direction * s, i, footprint);
+            if (there <= 0.0f) continue;
+            t = s, mask = there, normal = planes.normal, is_found = true;
+            break;
+        }
+    }
+    return is_found;
+}
+
+}  // namespace frazil
