@@ -4,6 +4,7 @@ import importlib
 from typing import Any
 
 from ._frazil import (
+    Bake,
     BetterDipole,
     Camera,
     ControlMesh,
@@ -49,13 +50,17 @@ from .warning import FrazilWarning
 _LAZY = {
     "Film": ".film",
     "UsdScene": ".usd",
+    "bake": ".baking",
+    "load_bake": ".baking",
     "load_usd": ".usd",
     "poisson_points": ".points",
     "read_meshes": ".usd",
     "render": ".rendering",
+    "save_bake": ".baking",
 }
 
 __all__ = [
+    "Bake",
     "BetterDipole",
     "Camera",
     "ControlMesh",
@@ -89,15 +94,18 @@ __all__ = [
     "TextureLookup",
     "UsdScene",
     "area_compensation",
+    "bake",
     "bake_irradiance",
     "fresnel_average",
     "fresnel_dielectric",
     "light_groups",
+    "load_bake",
     "load_usd",
     "point_statistics",
     "poisson_points",
     "read_meshes",
     "render",
+    "save_bake",
     "subdivide",
     "tessellated_points",
     "triangulate",

@@ -116,6 +116,9 @@ class PointSet:
     Points on a mesh that stand for its surface. The arrays are views of the set's own memory.
     """
 
+    def __init__(self) -> None:
+        """No points."""
+
     @property
     def positions(self) -> NDArray[numpy.float32]:
         """(N, 3) float32, metres."""
@@ -401,6 +404,10 @@ class DomeLight:
     @property
     def has_image(self) -> bool: ...
 
+    @property
+    def image(self) -> object:
+        """(height, width, 3) float32, or None."""
+
     def radiance(self, direction: Sequence[float]) -> list[float]:
         """
         Radiance from a unit direction in the light's own frame; 1 without an image.
@@ -432,6 +439,10 @@ class RectLight:
 
     @property
     def has_image(self) -> bool: ...
+
+    @property
+    def image(self) -> object:
+        """(height, width, 3) float32, or None."""
 
     @property
     def width(self) -> float: ...
@@ -504,6 +515,14 @@ class MeshLight:
 
     @property
     def object(self) -> int | None: ...
+
+    @property
+    def mesh(self) -> Mesh:
+        """A copy of the mesh."""
+
+    @property
+    def triangle_factors(self) -> object:
+        """(F, 3) float32, or None."""
 
     @property
     def is_two_sided(self) -> bool: ...

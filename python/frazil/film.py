@@ -90,6 +90,16 @@ class Film:
     def __repr__(self) -> str:
         return f"Film({self.width}x{self.height}: {', '.join(self.layers)})"
 
+    def additive_layers(self) -> dict[str, list[str]]:
+        """The layers that sum to the beauty, each with the layers of its light groups, where there are several.
+
+        A group's layers sum to their layer.
+        """
+        table = _aov_table()
+        names = [row["name"] for row in table if row["is_additive"] and row["name"] in self.layers]
+        known = {row["name"] for row in table}
+        return {name: [g for g in self.layers if g.startswith(f"{name}_") and g not in known] for name in names}
+
     def save(
         self,
         path: str | os.PathLike,

@@ -6,24 +6,27 @@ Units: metres; seconds in the stats, bytes for `peak_memory`.
 Not: reading scenes and writing files.
 """
 
+import os
 import resource
 import sys
-import threading
+import time
 import warnings
-from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from . import _frazil
+from .baking import BAKE_OPTIONS, Bake, refresh_bake
+from .checkpoint import Checkpoint
+from .denoise import check_denoiser, denoise_film
 from .film import Film
+from .stoppable import Progress, run_stoppable
 from .version import version
 from .warning import FrazilWarning
 
-__all__ = ["ESTIMATORS", "Progress", "render"]
+__all__ = ["ESTIMATORS", "render"]
 
-Progress = Callable[[str, float], None]
 ESTIMATORS = ("noise_free", "sum")
 
 
@@ -44,6 +47,12 @@ def render(
     tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
+    bake: Bake | None = None,
+    bake_cache: str | os.PathLike | None = None,
+    denoise: bool = False,
+    checkpoint: str | os.PathLike | None = None,
+    checkpoint_minutes: float = 10.0,
+    resume: bool = False,
     progress: Progress | None = None,
 ) -> Film:
     """Render a scene.
@@ -81,6 +90,20 @@ def render(
         ``noise_free`` or ``sum``.
     pixel_filter : str
         ``blackman_harris`` or ``box``.
+    bake : Bake, optional
+        Of this very scene (`frazil.bake`); without one the render bakes.
+    bake_cache : path-like, optional
+        A file that keeps the bake between renders: what in it still holds is taken over, the rest is baked anew and
+        written. ``film.stats["bake_cache"]`` tells.
+    denoise : bool
+        Open Image Denoise on the ray-traced layers; translucency has no noise. The layers still sum to the beauty.
+    checkpoint : path-like, optional
+        A file that keeps the state of the render every `checkpoint_minutes` and when it is stopped. Delete it once the
+        picture is written.
+    checkpoint_minutes : float
+        0 writes only when the render is stopped.
+    resume : bool
+        Go on from `checkpoint` to the bits of an unbroken render. ValueError where it is of another scene or options.
     progress : callable, optional
         Called as ``progress(stage, fraction)`` with fraction in [0, 1], from any thread. What it raises stops the
         render and is raised here.
@@ -123,12 +146,51 @@ def render(
         "filter": pixel_filter,
     }
     _refuse_what_cannot_fit(*resolution)
+    if resume and checkpoint is None:
+        raise ValueError("render: resume must come with a checkpoint, got none. Name its file.")
+    if denoise:
+        check_denoiser()
+    job: dict[str, Any] = {}
+    saved = None
+    if checkpoint is not None:
+        saved = Checkpoint(checkpoint, scene, options)
+        job |= {"checkpoint": saved.save, "checkpoint_seconds": 60.0 * checkpoint_minutes}
+    if resume and saved is not None:
+        job["resume"] = saved.load()
+    bake_stats: dict[str, Any] = {}
+    if bake_cache is not None:
+        bake, report = refresh_bake(scene, bake_cache, {k: options[k] for k in (*BAKE_OPTIONS, "threads")}, progress)
+        bake_stats = {**report.stats, "bake_cache": str(report)}
+    if bake is not None:
+        job["bake"] = bake
+
     core = _core_options(options)
-    result = _stoppable(lambda report: _frazil.render(scene, core, progress=report), progress)
-    stats = {**result.stats, "peak_memory": peak_memory()}
-    for message in stats["warnings"]:
+    result = run_stoppable(lambda report: _frazil.render(scene, core, progress=report, **job), progress)
+    stats = _both(bake_stats, result.stats)
+    for message in result.stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
-    return Film(result.layers, _provenance(scene, options, stats), stats)
+    film = Film(result.layers, _provenance(scene, options, stats), stats)
+    if denoise:
+        start = time.perf_counter()
+        denoise_film(film)
+        stats["seconds"]["denoise"] = time.perf_counter() - start
+    stats["peak_memory"] = peak_memory()
+    return film
+
+
+def _both(bake: dict[str, Any], render: dict[str, Any]) -> dict[str, Any]:
+    """The statistics of a bake and of the render that took it: counts and seconds add up."""
+    seconds = {
+        name: bake.get("seconds", {}).get(name, 0.0) + render.get("seconds", {}).get(name, 0.0)
+        for name in {**bake.get("seconds", {}), **render.get("seconds", {})}
+    }
+    both = {**render, "seconds": seconds}
+    for name in ("bake_rays", "dropped_samples"):
+        if name in bake:
+            both[name] = bake[name] + render.get(name, 0)
+    if "bake_cache" in bake:
+        both["bake_cache"] = bake["bake_cache"]
+    return both
 
 
 def _core_options(options: dict[str, Any]) -> _frazil.RenderOptions:
@@ -176,40 +238,3 @@ def _free_memory() -> int:
             return next(1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
     except (OSError, StopIteration):
         return sys.maxsize
-
-
-def _stoppable(work: Callable[[Progress], Any], progress: Progress | None) -> Any:
-    """Run ``work(report)`` in a thread of its own; after an exception here report() raises, which stops the work.
-
-    Signals are heard only by the main thread while it runs Python, so it must not be the one that computes.
-    """
-    stop, done = threading.Event(), threading.Event()
-    outcome: dict[str, Any] = {}
-
-    def report(stage: str, fraction: float) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        if progress is not None:
-            progress(stage, fraction)
-
-    def run() -> None:
-        try:
-            outcome["result"] = work(report)
-        except BaseException as error:
-            outcome["error"] = error
-        finally:
-            done.set()
-
-    worker = threading.Thread(target=run, name="frazil render", daemon=True)
-    worker.start()
-    try:
-        done.wait()  # not join(): interrupted, that takes a running thread for a stopped one
-    except BaseException:
-        stop.set()
-        done.wait()
-        raise
-    finally:
-        worker.join()
-    if "error" in outcome:
-        raise outcome["error"]
-    return outcome["result"]

@@ -30,6 +30,7 @@ def _frazil(
 
 def app() -> Callable[..., Any]:
     """The command line as a callable that takes ``args``, ``prog_name`` and ``standalone_mode``."""
+    from .bake import bake_command
     from .info import info_command
     from .render import render_command
 
@@ -40,5 +41,6 @@ def app() -> Callable[..., Any]:
         from .points import points_command
 
         commands.command("points")(points_command)
+    commands.command("bake")(bake_command)
     commands.command("info")(info_command)
     return typer.main.get_command(commands).main

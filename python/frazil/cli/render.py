@@ -4,43 +4,19 @@ import json
 import math
 import time
 import warnings
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..warning import FrazilWarning
+from .checks import misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
 from .frames import fill_pattern, has_pattern, parse_frames, parse_resolution
 from .progress import PROGRESS_KINDS, make_progress
 
 __all__ = ["render_command"]
 
 DEFAULT_RESOLUTION = (960, 540)
-
-
-def _misused(option: str, message: str) -> typer.BadParameter:
-    return typer.BadParameter(message, param_hint=option)
-
-
-def _one_of(option: str, value: str, known: tuple[str, ...]) -> str:
-    """The value, where it is known; else the error with the nearest."""
-    if value in known:
-        return value
-    nearest = get_close_matches(value, known, n=1)
-    hint = f" Did you mean {nearest[0]}?" if nearest else ""
-    raise _misused(option, f"must be one of {', '.join(known)}, got '{value}'.{hint}")
-
-
-def _positive(option: str, value: float, may_be_zero: bool = False) -> None:
-    if math.isfinite(value) and (value > 0 or (may_be_zero and value == 0)):
-        return
-    raise _misused(option, f"must be {'>=' if may_be_zero else '>'} 0 and finite, got {value}.")
-
-
-def _within(option: str, value: int, low: int, high: int) -> None:
-    if not low <= value <= high:
-        raise _misused(option, f"must be from {low} to {high}, got {value}.")
 
 
 def render_command(
@@ -58,7 +34,30 @@ def render_command(
         str | None,
         typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),
     ] = None,
-    samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel.")] = 32,
+    samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel; the most, where --noise is given.")] = 32,
+    noise: Annotated[
+        float,
+        typer.Option(metavar="ERROR", help="Relative standard error at which a pixel gets no more samples. 0 = off."),
+    ] = 0.0,
+    min_samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel before --noise is asked.")] = 16,
+    denoise: Annotated[
+        bool, typer.Option("--denoise", help="Open Image Denoise on the ray-traced layers, each by itself.")
+    ] = False,
+    bake_cache: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.bake", help="Keep points and light here; what in it still holds is not baked again."
+        ),
+    ] = None,
+    checkpoint: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MINUTES", help="Write OUT.checkpoint this often and when stopped. 0 = only when stopped."
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from OUT.checkpoint, where there is one, to the same bits.")
+    ] = False,
     frame: Annotated[
         float | None, typer.Option(metavar="F", help="Time code to render. Default: the stage's default values.")
     ] = None,
@@ -107,35 +106,47 @@ def render_command(
         try:
             size = parse_resolution(resolution)
         except ValueError as error:
-            raise _misused("--resolution", str(error)) from None
+            raise misused("--resolution", str(error)) from None
     from ..image import COMPRESSIONS
     from ..rendering import ESTIMATORS
 
-    _one_of("--compression", compression, COMPRESSIONS)
-    _one_of("--estimator", estimator, ESTIMATORS)
-    _one_of("--progress", progress, PROGRESS_KINDS)
-    _positive("--tolerance", tolerance)
-    _positive("--spacing-scale", spacing_scale)
-    _positive("--spacing", spacing, may_be_zero=True)
-    _within("--samples", samples, 1, 2**24)
-    _within("--threads", threads, 0, 4096)
-    _within("--seed", seed, 0, 2**32 - 1)
-    _within("--max-bounces", max_bounces, 0, 1024)
-    _within("--bake-samples", bake_samples, 1, 2**20)
-    _within("--bake-bounces", bake_bounces, 0, 64)
+    one_of("--compression", compression, COMPRESSIONS)
+    one_of("--estimator", estimator, ESTIMATORS)
+    one_of("--progress", progress, PROGRESS_KINDS)
+    positive("--tolerance", tolerance)
+    positive("--spacing-scale", spacing_scale)
+    positive("--spacing", spacing, may_be_zero=True)
+    within("--samples", samples, 1, 2**24)
+    within("--min-samples", min_samples, 1, 2**24)
+    positive("--noise", noise, may_be_zero=True)
+    if checkpoint is not None:
+        positive("--checkpoint", checkpoint, may_be_zero=True)
+    within("--threads", threads, 0, 4096)
+    within("--seed", seed, 0, 2**32 - 1)
+    within("--max-bounces", max_bounces, 0, 1024)
+    within("--bake-samples", bake_samples, 1, 2**20)
+    within("--bake-bounces", bake_bounces, 0, 64)
     layers = _chosen_layers(aov)
     jobs = _jobs(output, png, no_png, frame, frames)
-    _refuse_unreadable(scene)
+    refuse_unreadable(scene)
     for _, exr, preview in jobs:
-        _refuse_unwritable(exr, preview)
+        refuse_unwritable(exr, preview)
+        if checkpoint is not None or resume:
+            refuse_unwritable(_checkpoint_of(exr))
     if stats is not None:
-        _refuse_unwritable(stats)
+        refuse_unwritable(stats)
+    if bake_cache is not None:
+        refuse_unwritable(bake_cache)
 
     from ..rendering import render as render_scene
     from ..usd import load_usd
 
     options: dict[str, Any] = {
         "samples": samples,
+        "noise": noise,
+        "min_samples": min_samples,
+        "denoise": denoise,
+        "bake_cache": bake_cache,
         "seed": seed,
         "threads": threads,
         "max_bounces": max_bounces,
@@ -154,12 +165,20 @@ def render_command(
             seconds_load = time.perf_counter() - start
             reporter("load", 1.0)
 
+            if checkpoint is not None or resume:
+                saved = _checkpoint_of(exr)
+                options |= {"checkpoint": saved, "resume": resume and saved.exists()}
+                options["checkpoint_minutes"] = 10.0 if checkpoint is None else checkpoint
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
 
             start = time.perf_counter()
             film.save(exr, compression, layers=layers or _authored_layers(loaded))
             if preview is not None:
                 film.save_preview(preview)
+            if checkpoint is not None or resume:
+                _checkpoint_of(exr).unlink(missing_ok=True)
+            if bake_cache is not None and not quiet:
+                print(f"frazil: {bake_cache}: {film.stats['bake_cache']}", flush=True)
             records.append(_record(film, time_code, exr, seconds_load, time.perf_counter() - start))
             reporter.frame_done()
             if stats is not None:
@@ -178,7 +197,7 @@ def _chosen_layers(aov: list[str] | None) -> list[str] | None:
     from .._frazil import aov_table
 
     known = tuple(row["name"] for row in aov_table())
-    names = [_one_of("--aov", name.strip(), known) for part in aov for name in part.split(",")]
+    names = [one_of("--aov", name.strip(), known) for part in aov for name in part.split(",")]
     return list(dict.fromkeys(["beauty", *names]))
 
 
@@ -187,41 +206,32 @@ def _jobs(
 ) -> list[tuple[float | None, Path, Path | None]]:
     """(time code, EXR, PNG) for every frame that is asked for."""
     if output.suffix.lower() != ".exr":
-        raise _misused("-o", f"must be a file name that ends in .exr, got '{output}'.")
+        raise misused("-o", f"must be a file name that ends in .exr, got '{output}'.")
     if png is not None and png.suffix.lower() != ".png":
-        raise _misused("--png", f"must be a file name that ends in .png, got '{png}'.")
+        raise misused("--png", f"must be a file name that ends in .png, got '{png}'.")
     if png is not None and no_png:
-        raise _misused("--png", "must not be given together with --no-png.")
+        raise misused("--png", "must not be given together with --no-png.")
     if frame is not None and frames is not None:
-        raise _misused("--frame", "must not be given together with --frames.")
+        raise misused("--frame", "must not be given together with --frames.")
     if frame is not None and not math.isfinite(frame):
-        raise _misused("--frame", f"must be finite, got {frame}.")
+        raise misused("--frame", f"must be finite, got {frame}.")
     try:
         time_codes: list[float | None] = list(parse_frames(frames)) if frames is not None else [frame]
     except ValueError as error:
-        raise _misused("--frames", str(error)) from None
+        raise misused("--frames", str(error)) from None
     if len(time_codes) > 1:
         for option, path in (("-o", output), ("--png", png)):
             if path is not None and not has_pattern(path):
-                raise _misused(option, f"must have a place for the frame's number, got '{path}'. As in out.####.exr.")
+                raise misused(option, f"must have a place for the frame's number, got '{path}'. As in out.####.exr.")
     preview = None if no_png else png or output.with_suffix(".png")
     try:
         return [(t, fill_pattern(output, t), preview and fill_pattern(preview, t)) for t in time_codes]
     except ValueError as error:
-        raise _misused("-o", str(error)) from None
+        raise misused("-o", str(error)) from None
 
 
-def _refuse_unreadable(scene: Path) -> None:
-    if not scene.exists():
-        raise FileNotFoundError(f"{scene}: file must exist. Check the path.")
-
-
-def _refuse_unwritable(*paths: Path | None) -> None:
-    from ..replacing import check_writable
-
-    for path in paths:
-        if path is not None:
-            check_writable(path)
+def _checkpoint_of(exr: Path) -> Path:
+    return exr.with_suffix(".checkpoint")
 
 
 def _authored_resolution(loaded: Any) -> tuple[int, int]:

@@ -8,6 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/partitioner.h>
 #include <oneapi/tbb/task_arena.h>
+#include <oneapi/tbb/task_group.h>
 
 #include <cstddef>
 #include <vector>
@@ -37,6 +38,12 @@ T parallel_sum(std::size_t count, std::size_t grain, T zero, const Term& term) {
     T total = zero;
     for (const T& value : partial) total += value;
     return total;
+}
+
+// Whether the loop that this thread works for is being broken off by an exception: loops inside its body then end early,
+// and what they were to compute must not be used.
+inline bool is_breaking_off() {
+    return oneapi::tbb::is_current_task_group_canceling();
 }
 
 // Run work() with at most `threads` threads in its parallel loops; 0 means all cores.

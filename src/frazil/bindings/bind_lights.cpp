@@ -28,6 +28,16 @@ std::shared_ptr<const Image> to_image(const std::optional<ImageArray>& image, co
                                          std::vector<Rgb>(pixels, pixels + image->shape(0) * image->shape(1)), path);
 }
 
+// The pixels of a light's image as a view, None where it has none.
+template <class Shape>
+nb::object image_of(nb::handle self) {
+    const Shape& light = nb::cast<const Shape&>(self);
+    if (!light.image) return nb::none();
+    const auto& image = *light.image;
+    return nb::cast(
+        view(&image.pixels().data()->x, {std::size_t(image.height()), std::size_t(image.width()), 3}, self));
+}
+
 }  // namespace
 
 void bind_lights(nb::module_& module) {
@@ -44,6 +54,8 @@ void bind_lights(nb::module_& module) {
             },
             "image"_a = nb::none(), "path"_a = "DomeLight")
         .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
+        .def_prop_ro("image", [](nb::handle self) { return image_of<DomeLight>(self); },
+                     "(height, width, 3) float32, or None.")
         .def(
             "radiance",
             [](const DomeLight& light, const Triple& direction) {
@@ -69,6 +81,8 @@ void bind_lights(nb::module_& module) {
             },
             "width"_a = 1.0f, "height"_a = 1.0f, "image"_a = nb::none(), "path"_a = "RectLight")
         .def_prop_ro("has_image", [](const RectLight& light) { return light.image != nullptr; })
+        .def_prop_ro("image", [](nb::handle self) { return image_of<RectLight>(self); },
+                     "(height, width, 3) float32, or None.")
         .def_rw("width", &RectLight::width)
         .def_rw("height", &RectLight::height);
     nb::class_<DiskLight>(module, "DiskLight", "A disk in x and y that shines along -z, in the light's units.")
@@ -114,6 +128,15 @@ void bind_lights(nb::module_& module) {
                      [](const MeshLight& light) {
                          return light.object == kNoObject ? std::optional<std::uint32_t>() : light.object;
                      })
+        .def_prop_ro("mesh", [](const MeshLight& light) { return *light.mesh; }, "A copy of the mesh.")
+        .def_prop_ro(
+            "triangle_factors",
+            [](nb::handle self) -> nb::object {
+                const MeshLight& light = nb::cast<const MeshLight&>(self);
+                if (!light.triangle_factors) return nb::none();
+                return nb::cast(view(&light.triangle_factors->data()->x, {light.triangle_factors->size(), 3}, self));
+            },
+            "(F, 3) float32, or None.")
         .def_ro("is_two_sided", &MeshLight::is_two_sided)
         .def_ro("is_material", &MeshLight::is_material);
 

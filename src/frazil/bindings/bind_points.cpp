@@ -37,6 +37,7 @@ Progress make_progress(const std::optional<nb::callable>& report) {
 void bind_points(nb::module_& module) {
     nb::class_<PointSet>(module, "PointSet",
                          "Points on a mesh that stand for its surface. The arrays are views of the set's own memory.")
+        .def(nb::init<>(), "No points.")
         .def_prop_ro(
             "positions",
             [](PointSet& p) {

@@ -37,6 +37,9 @@ class Environment {
     void eval_many(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
     void sample_many(std::span<const V2f> u, std::span<V3f> directions, std::span<float> pdfs,
                      std::span<Rgb> radiances) const;
+    int width() const { return width_; }
+    int height() const { return height_; }
+    const std::vector<Rgb>& pixels() const { return pixels_; }
     // Mean radiance over the sphere.
     Rgb average() const { return average_; }
 

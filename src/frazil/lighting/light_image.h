@@ -23,6 +23,9 @@ class LightImage {
     // A position and its density over the unit square.
     V2f sample(const V2f& u, float& pdf) const;
     float pdf(const V2f& position) const;
+    int width() const { return width_; }
+    int height() const { return height_; }
+    const std::vector<Rgb>& pixels() const { return pixels_; }
     // Mean absolute luminance.
     float brightness() const { return brightness_; }
 

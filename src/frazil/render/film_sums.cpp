@@ -90,11 +90,12 @@ float FilmSums::luminance_of_mean(std::size_t film_pixel) const {
 // The squared standard error of the mean: the variance of the subsets' means over their number.
 float FilmSums::variance_of_mean(std::size_t film_pixel) const {
     const auto samples = static_cast<int>(samples_[film_pixel]);
-    if (samples < kSampleSubsets) return std::numeric_limits<float>::infinity();
+    constexpr int kRound = kSampleSubsets * kSubsetRun;
+    if (samples <= kRound - kSubsetRun) return std::numeric_limits<float>::infinity();
     std::array<float, kSampleSubsets> means;
     float mean = 0.0f, squares = 0.0f;
     for (int subset = 0; subset < kSampleSubsets; ++subset) {
-        const int own = (samples + kSampleSubsets - 1 - subset) / kSampleSubsets;
+        const int own = samples / kRound * kSubsetRun + std::clamp(samples % kRound - subset * kSubsetRun, 0, kSubsetRun);
         means[subset] = subsets_[film_pixel * kSampleSubsets + subset] / static_cast<float>(own);
         mean += means[subset] / kSampleSubsets;
     }

@@ -187,7 +187,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
                 const V2f u = sampler.next_2d();
                 const float image_x = (x + 0.5f + filter.offset(u.x)) / options.width;
                 const float image_y = (y + 0.5f + filter.offset(u.y)) / options.height;
-                tile.subset = sample % kSampleSubsets;
+                tile.subset = subset_of(sample);
                 ++tile.camera_rays;
                 tracer.trace(camera_ray(scene.camera, image_x, image_y, aspect), view_axis, sampler, tile_pixel, tile);
             }
@@ -231,6 +231,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
                 Tile tile(kTileSize * kTileSize, groups.size());
                 render_tile(scene, options, tracer, view_axis, filter, canvas, open[i], tile);
+                if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);
                 camera_rays += tile.camera_rays;
                 rays += tile.rays;

@@ -18,8 +18,12 @@ enum class Component { translucency, diffuse, specular, refraction, volume, emis
 inline constexpr std::size_t kComponentCount = 7;
 inline constexpr std::array<const char*, kComponentCount> kComponentNames = {
     "translucency", "diffuse", "specular", "refraction", "volume", "emission", "background"};
-// A pixel's samples are dealt in turn to so many subsets, whose spread tells the noise of all together.
-inline constexpr int kSampleSubsets = 4;
+// A pixel's samples are dealt in runs to so many subsets, whose spread tells the noise of all together. A run of four is a
+// net of its own; samples dealt one by one would share a quarter of the sampler's first dimension.
+inline constexpr int kSampleSubsets = 4, kSubsetRun = 4;
+inline int subset_of(int sample) {
+    return sample / kSubsetRun % kSampleSubsets;
+}
 
 // What the camera sees first along one sample.
 struct PrimaryHit {

@@ -1,0 +1,67 @@
+"""Adaptive sampling ends where the noise is as asked; denoising keeps the sum."""
+
+import numpy as np
+import pytest
+from small_scenes import ice_over_floor
+
+import frazil as fz
+from frazil.denoise import denoise_film
+
+OPTIONS = {"spacing": 0.2, "bake_samples": 4, "resolution": (128, 72)}
+
+
+def luminance(film):
+    return film["beauty"][:, :, :3] @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+
+
+@pytest.fixture(scope="module")
+def lit():
+    """The scene, and what every render of it shall share: noise is then the camera paths' alone."""
+    scene = ice_over_floor()
+    return scene, fz.bake(scene, spacing=0.2, bake_samples=4)
+
+
+def test_noise_is_as_asked_and_samples_go_where_it_is_hard(lit):
+    scene, bake = lit
+    truth = luminance(fz.render(scene, bake=bake, samples=2048, seed=9, resolution=(48, 27)))
+    film = fz.render(scene, bake=bake, samples=2048, noise=0.03, resolution=(48, 27))
+    counts = film["sample_count"][:, :, 0]
+    assert 16 <= counts.min() < counts.max() <= 2048
+    assert counts.mean() < 0.5 * 2048
+    relative = (luminance(film) - truth) / (truth + 0.1 * truth.mean())
+    rms = np.sqrt(np.mean(relative**2))
+    assert 0.003 < rms < 0.03, rms
+
+
+def test_variance_is_that_of_renders_with_other_seeds(lit):
+    scene, bake = lit
+    films = [fz.render(scene, bake=bake, samples=32, seed=seed, resolution=(48, 27)) for seed in range(12)]
+    spread = np.var([luminance(film) for film in films], axis=0, ddof=1).mean()
+    told = np.mean([film["variance"] for film in films])
+    # All samples together are stratified better than their subsets: the estimate errs on the safe side.
+    assert 0.7 * spread < told < 4.0 * spread
+
+
+def test_denoised_layers_still_sum_to_the_beauty():
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is an extra")
+    scene = ice_over_floor()
+    noisy = fz.render(scene, samples=4, **OPTIONS)
+    film = fz.render(scene, samples=4, denoise=True, **OPTIONS)
+    truth = fz.render(scene, samples=512, **OPTIONS)
+    additive = film.additive_layers()
+    np.testing.assert_allclose(sum(film[n] for n in additive), film["beauty"][:, :, :3], rtol=1e-5, atol=1e-6)
+    for name, groups in additive.items():
+        np.testing.assert_allclose(sum(film[g] for g in groups), film[name], rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(film["translucency"], noisy["translucency"])
+    for name in ("diffuse", "specular"):
+        before, after = (np.sqrt(np.mean((f[name] - truth[name]) ** 2)) for f in (noisy, film))
+        assert after < 0.7 * before, name
+
+
+def test_negative_light_stays_negative():
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is an extra")
+    film = fz.render(ice_over_floor(key=-10.0), samples=8, **OPTIONS)
+    before = film["diffuse_key"].mean()
+    assert before < 0.0
+    denoise_film(film)
+    assert film["diffuse_key"].mean() == pytest.approx(before, rel=0.05)
