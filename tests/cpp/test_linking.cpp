@@ -135,7 +135,7 @@ TEST_CASE("passages: a slab of ice takes Fresnel's share twice and what it absor
         const Ray ray{V3f(0.0f), V3f(std::sin(angle), 0.0f, std::cos(angle))};
         scene.set_passages({});
         CHECK(transmittance(scene, ray) == Rgb(0.0f));
-        scene.set_passages({{true, 1.31f, absorption}, {}});
+        scene.set_passages({{1.0f, 1.31f, absorption}, {}});
         const Rgb found = transmittance(scene, ray);
         const double through = 1.0 - double(fresnel_dielectric(std::cos(angle), 1.31f));
         for (int c = 0; c < 3; ++c) {
@@ -151,7 +151,7 @@ TEST_CASE("passages: a slab of ice takes Fresnel's share twice and what it absor
           doctest::Approx(once * std::exp(-0.05)).epsilon(1e-3));
     // In the bake.
     CHECK(irradiance_at({sun()}, 0.0f, scene).x == doctest::Approx(once * once * std::exp(-0.2)).epsilon(1e-3));
-    scene.set_passages({{true, 1.31f, absorption}, {}});
+    scene.set_passages({{1.0f, 1.31f, absorption}, {}});
     CHECK(transmittance(scene, {V3f(100, 0, 4), V3f(0, 0, 1)}) == Rgb(0.0f));
 }
 

@@ -41,6 +41,10 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
+// What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
+// absorbs; others nothing.
+std::vector<Passage> passages_of(const Scene& scene);
+
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
