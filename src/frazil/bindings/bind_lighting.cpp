@@ -5,6 +5,7 @@
 #include "frazil/base/parallel.h"
 #include "frazil/bindings/bindings.h"
 #include "frazil/lighting/irradiance.h"
+#include "frazil/lighting/occlusion.h"
 #include "frazil/material/microfacet.h"
 #include "frazil/translucency/fresnel.h"
 
@@ -127,6 +128,46 @@ void bind_lighting(nb::module_& module) {
         "(N, G, 3) float32, W/m²: one row per light group, see light_groups; with `return_error` a tuple of it and "
         "(N,).\n\n"
         "Raises\n------\nValueError\n    For lights, points or options out of range, by name.");
+
+    const auto occlusion_arrays = [](Occlusion&& occlusion) {
+        const std::size_t count = occlusion.openness.size();
+        return nb::make_tuple(to_array<float, float>(std::move(occlusion.openness), {count}),
+                              to_array<V3f, float>(std::move(occlusion.bent_normals), {count, 3}));
+    };
+    module.def(
+        "bake_occlusion",
+        [occlusion_arrays](const nb::object& points, const RayScene& scene, int samples, std::uint32_t seed,
+                           float distance) {
+            const PointSet set = to_points(points);
+            std::optional<Occlusion> result;
+            {
+                nb::gil_scoped_release release;
+                result = bake_occlusion(set, scene, {samples, seed, distance});
+            }
+            return occlusion_arrays(std::move(*result));
+        },
+        "points"_a, "scene"_a, nb::kw_only(), "samples"_a = 64, "seed"_a = 0,
+        "distance"_a = std::numeric_limits<float>::infinity(),
+        "How much of the sky each point sees, by rays.\n\n"
+        "Parameters\n----------\n"
+        "points : PointSet, or any object with positions and normals (N, 3) float32, metres.\n"
+        "scene : RayScene that occludes. samples : rays per point. distance : metres within which things occlude.\n\n"
+        "Returns\n-------\n"
+        "openness (N,) from 0 to 1, weighed by the cosine, and bent normals (N, 3): the mean open directions.\n\n"
+        "Raises\n------\nValueError\n    For options out of range.");
+    module.def(
+        "point_occlusion",
+        [occlusion_arrays](const PointSet& points, float distance, float tolerance) {
+            std::optional<Occlusion> result;
+            {
+                nb::gil_scoped_release release;
+                result = point_occlusion(points, distance, tolerance);
+            }
+            return occlusion_arrays(std::move(*result));
+        },
+        "points"_a, nb::kw_only(), "distance"_a = std::numeric_limits<float>::infinity(), "tolerance"_a = 0.05f,
+        "The same as bake_occlusion from the points alone, without rays: each hides as a disk of its area.\n\n"
+        "`tolerance` is the solid angle in steradian below which a cluster of points counts as one disk.");
 
     module.def(
         "measure_bake",
