@@ -238,3 +238,11 @@ TEST_CASE("render: a shining mesh is seen, lights the floor by the closed form, 
     const Film up = render(scene, small()).film;
     CHECK(mean_inside(up, "emission", 0) == doctest::Approx(1.0).epsilon(1e-4));
 }
+
+TEST_CASE("render: a light inside ice lights none of its outside, and nothing breaks") {
+    Scene scene = scene_of(sphere(1.0f, 3), ice(Rgb(0.2f), 1.31f, 0.3f, CompensationMode::ratio));
+    scene.lights = {make_light(SphereLight{0.2f})};
+    const Film film = render(scene, small()).film;
+    CHECK(mean_inside(film, "translucency", 0) == 0.0);
+    CHECK(std::isfinite(mean_inside(film, "beauty", 0)));
+}
