@@ -1141,6 +1141,9 @@ class Object:
     def material(self) -> int: ...
 
     @property
+    def asset(self) -> str: ...
+
+    @property
     def matrix(self) -> object: ...
 
     def __repr__(self) -> str: ...
@@ -1162,9 +1165,10 @@ class Scene:
     def add_material(self, path: str, model: StandardMaterial | IceMaterial) -> int:
         """Add a StandardMaterial or IceMaterial (copied); its index."""
 
-    def add_object(self, path: str, mesh: int, material: int, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None) -> int:
+    def add_object(self, path: str, mesh: int, material: int, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, asset: str = '') -> int:
         """
         Place a mesh by a (4, 4) float64 matrix for row vectors, None = identity; the object's index.
+        `asset` is what it belongs to, for Cryptomatte; '' = itself.
         """
 
     def add_light(self, light: Light) -> int:
@@ -1295,6 +1299,12 @@ class RenderOptions:
     def bake_bounces(self, arg: int, /) -> None: ...
 
     @property
+    def aovs(self) -> list[str]: ...
+
+    @aovs.setter
+    def aovs(self, arg: Sequence[str], /) -> None: ...
+
+    @property
     def tolerance(self) -> float: ...
 
     @tolerance.setter
@@ -1354,6 +1364,22 @@ class RenderResult:
         """
 
     @property
+    def light_groups(self) -> list[str]:
+        """
+        list of str: in the order of the layers; '' for lights without a group.
+        """
+
+    @property
+    def ramp_knots(self) -> list:
+        """
+        list of dict, one per layer translucency_ramp<K>: material, distance (metres), color, share of energy, ...
+        """
+
+    @property
+    def compensations(self) -> list:
+        """list of dict, one per material of ice: material, mode, strength."""
+
+    @property
     def stats(self) -> dict:
         """
         dict: points, nodes, rays, gathers, dropped samples, seconds per stage.
@@ -1383,4 +1409,16 @@ def bake(scene: Scene, options: RenderOptions, *, known: Bake | None = None, pro
     """
     Points and light of a scene's translucent bodies; what is `known` (points of objects that have some, light
     of the groups that are named) is taken over.
+    """
+
+def cryptomatte_hash(name: str) -> int:
+    """MurmurHash3_32 of a name, as Cryptomatte has it."""
+
+def cryptomatte_id(name: str) -> float:
+    """The float32 that stands for a name in a Cryptomatte."""
+
+def mix_layers(layers: Sequence[Annotated[NDArray, dict(order='C', device='cpu', writable=False)]], weights: numpy.typing.ArrayLike, out: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu')]) -> None:
+    """
+    Write the weighted sum of (H, W, 3) layers, float16 or float32, to the float32 array `out`.
+    weights: (layers, 3), per channel.
     """

@@ -2,11 +2,12 @@
 
 Model: layers are views of the renderer's own memory, driven by the core's AOV table; the additive ones sum to the
 beauty. Units: by layer, see `frazil info` or docs/architecture.md. Row 0 is on top.
-Not: changing colours after the render.
+Not: changing colours after the render (grading.py).
 """
 
 import json
 import os
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
@@ -15,15 +16,10 @@ from typing import Any
 import numpy as np
 
 from . import image
+from .aovs import aov_table
 from .warning import FrazilWarning
 
 __all__ = ["Film"]
-
-
-def _aov_table() -> list[dict[str, Any]]:
-    from ._frazil import aov_table
-
-    return aov_table()
 
 
 class Film:
@@ -95,10 +91,12 @@ class Film:
 
         A group's layers sum to their layer.
         """
-        table = _aov_table()
+        table = aov_table()
         names = [row["name"] for row in table if row["is_additive"] and row["name"] in self.layers]
         known = {row["name"] for row in table}
-        return {name: [g for g in self.layers if g.startswith(f"{name}_") and g not in known] for name in names}
+        knots = re.compile(r"translucency_ramp\d+(_.*)?")
+        others = [g for g in self.layers if g not in known and not knots.fullmatch(g)]
+        return {name: [g for g in others if g.startswith(f"{name}_")] for name in names}
 
     def save(
         self,
@@ -108,6 +106,7 @@ class Film:
         layers: Sequence[str] | None = None,
         half_layers: Sequence[str] = (),
         float_layers: Sequence[str] = (),
+        multipart: bool = False,
     ) -> None:
         """Write the layers as one multi-channel OpenEXR, whole or not at all.
 
@@ -122,6 +121,8 @@ class Film:
         half_layers, float_layers : sequence of str
             Layers to store as half or float instead of what the AOV table says. A half layer with values beyond 65504
             is stored as float, with a warning.
+        multipart : bool
+            Every layer in a part of its own, named after it; else all in one part.
 
         Raises
         ------
@@ -130,9 +131,9 @@ class Film:
         OSError
             Where the file cannot be written; the old one is then untouched.
         """
-        table = {row["name"]: row for row in _aov_table()}
+        table = {row["name"]: row for row in aov_table()}
         chosen = {name: self[name] for name in (layers if layers is not None else self.layers)}
-        halves = {name for name in chosen if table.get(name, {}).get("is_half", True)}
+        halves = {name for name in chosen if not name.startswith("crypto") and table.get(name, {}).get("is_half", True)}
         for name in (*half_layers, *float_layers):
             self[name]  # refuse unknown names
         halves = (halves | set(half_layers)) - set(float_layers)
@@ -141,7 +142,9 @@ class Film:
             chosen,
             {name: _letters(name, array, table) for name, array in chosen.items()},
             half_layers=sorted(halves),
+            exact_layers=[name for name in chosen if name.startswith("crypto")],
             compression=compression,
+            multipart=multipart,
             metadata=_header(self.metadata),
         )
         for name in promoted:
@@ -156,15 +159,22 @@ class Film:
         return image.write_png(path, self["beauty"][:, :, :3])
 
     @classmethod
-    def load(cls, path: str | os.PathLike) -> "Film":
-        """Read an EXR that `save` wrote, or any multi-channel EXR.
+    def load(cls, path: str | os.PathLike, *, keep_half: bool = False) -> "Film":
+        """Read an EXR that `save` wrote, or any EXR of one or several parts.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        keep_half : bool
+            Give float16 for layers that are stored as half, at half the memory; else all are float32.
 
         Raises
         ------
         OSError
             For a file that is missing, truncated or no image.
         """
-        layers, metadata = image.read_exr(path)
+        layers, metadata = image.read_exr(path, keep_half=keep_half)
         return cls(layers, metadata)
 
 

@@ -6,19 +6,23 @@ Units: metres; seconds in the stats, bytes for `peak_memory`.
 Not: reading scenes and writing files.
 """
 
+import json
 import os
 import resource
 import sys
 import time
 import warnings
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
 from . import _frazil
+from .aovs import chosen_aovs
 from .baking import BAKE_OPTIONS, Bake, refresh_bake
 from .checkpoint import Checkpoint
+from .cryptomatte import scene_headers
 from .denoise import check_denoiser, denoise_film
 from .film import Film
 from .stoppable import Progress, run_stoppable
@@ -47,6 +51,7 @@ def render(
     tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
+    aovs: Sequence[str] = (),
     bake: Bake | None = None,
     bake_cache: str | os.PathLike | None = None,
     denoise: bool = False,
@@ -90,6 +95,8 @@ def render(
         ``noise_free`` or ``sum``.
     pixel_filter : str
         ``blackman_harris`` or ``box``.
+    aovs : sequence of str
+        Layers of the AOV table to make beside those that are made anyway; see docs/aovs.md.
     bake : Bake, optional
         Of this very scene (`frazil.bake`); without one the render bakes.
     bake_cache : path-like, optional
@@ -119,6 +126,8 @@ def render(
         For a scene or options out of range; the message begins with the object's path.
     MemoryError
         Where the picture would not fit into the memory that is free.
+    KeyError
+        For an unknown AOV; the message has the nearest.
     KeyboardInterrupt
         On Ctrl-C, at the next tile.
 
@@ -144,6 +153,7 @@ def render(
         "tolerance": tolerance,
         "estimator": estimator,
         "filter": pixel_filter,
+        "aovs": chosen_aovs(aovs),
     }
     _refuse_what_cannot_fit(*resolution)
     if resume and checkpoint is None:
@@ -169,7 +179,8 @@ def render(
     stats = _both(bake_stats, result.stats)
     for message in result.stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
-    film = Film(result.layers, _provenance(scene, options, stats), stats)
+    metadata = _provenance(scene, options, stats) | _what_layers_hold(result) | scene_headers(scene, aovs)
+    film = Film(result.layers, metadata, stats)
     if denoise:
         start = time.perf_counter()
         denoise_film(film)
@@ -219,6 +230,17 @@ def _provenance(scene: Any, options: dict[str, Any], stats: dict[str, Any]) -> d
         "frazil:dropped_samples": int(stats.get("dropped_samples", 0)),
     }
     return origin | {f"frazil:{name}": value for name, value in options.items() if name not in ("width", "height")}
+
+
+def _what_layers_hold(result: Any) -> dict[str, Any]:
+    """What a later change of the layers needs to know of them."""
+    knots = list(result.ramp_knots)
+    return {
+        "frazil:light_groups": [name or "default" for name in result.light_groups],
+        "frazil:additive": [row["name"] for row in _frazil.aov_table() if row["is_additive"]],
+        "frazil:compensation": json.dumps(list(result.compensations)),
+        "frazil:ramp_knots": json.dumps(knots) if knots else None,
+    }
 
 
 def _refuse_what_cannot_fit(width: int, height: int) -> None:

@@ -22,7 +22,7 @@ CAMERA_TO_WORLD = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 2, 3, 
 
 
 def aov_table():
-    fixed = {"meaning": "made up", "filter": "average"}
+    fixed = {"meaning": "made up", "filter": "average", "is_default": True}
     return [fixed | dict(zip(("name", "channels", "is_additive", "is_half"), row, strict=True)) for row in AOVS]
 
 
@@ -62,7 +62,13 @@ class Core:
             "warnings": [],
             "seconds": {"points": 0.1, "render": 0.2},
         }
-        return SimpleNamespace(layers=layers(options.width, options.height), stats=stats)
+        return SimpleNamespace(
+            layers=layers(options.width, options.height),
+            stats=stats,
+            light_groups=["key", ""],
+            ramp_knots=[],
+            compensations=[],
+        )
 
 
 def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"):

@@ -31,7 +31,9 @@ def _frazil(
 def app() -> Callable[..., Any]:
     """The command line as a callable that takes ``args``, ``prog_name`` and ``standalone_mode``."""
     from .bake import bake_command
+    from .grade import grade_command
     from .info import info_command
+    from .match import match_command
     from .render import render_command
 
     commands = typer.Typer(add_completion=False, no_args_is_help=False, rich_markup_mode="rich")
@@ -41,6 +43,8 @@ def app() -> Callable[..., Any]:
         from .points import points_command
 
         commands.command("points")(points_command)
+    commands.command("grade")(grade_command)
+    commands.command("match")(match_command)
     commands.command("bake")(bake_command)
     commands.command("info")(info_command)
     return typer.main.get_command(commands).main

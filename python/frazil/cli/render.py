@@ -80,11 +80,15 @@ def render_command(
     compression: Annotated[
         str, typer.Option(metavar="NAME", help="Of the EXR: none, rle, zip, zips, piz, pxr24, b44, b44a, dwaa, dwab.")
     ] = "zips",
+    multipart: Annotated[
+        bool, typer.Option("--multipart", help="Write every layer as a part of its own, which programs read singly.")
+    ] = False,
     aov: Annotated[
         list[str] | None,
         typer.Option(
             metavar="LAYER",
-            help="Write only these layers (repeat it, or comma between). Default: the stage's render vars, else all.",
+            help="Write only these layers (repeat it, or comma between); 'all' stands for the usual ones, as in "
+            "all,translucency_ramp. Default: the stage's render vars, else all.",
         ),
     ] = None,
     png: Annotated[
@@ -138,6 +142,7 @@ def render_command(
     if bake_cache is not None:
         refuse_unwritable(bake_cache)
 
+    from ..aovs import layers_of
     from ..rendering import render as render_scene
     from ..usd import load_usd
 
@@ -165,6 +170,8 @@ def render_command(
             seconds_load = time.perf_counter() - start
             reporter("load", 1.0)
 
+            chosen = layers or _authored_layers(loaded)
+            options["aovs"] = chosen or ()
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)
                 options |= {"checkpoint": saved, "resume": resume and saved.exists()}
@@ -172,7 +179,7 @@ def render_command(
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
 
             start = time.perf_counter()
-            film.save(exr, compression, layers=layers or _authored_layers(loaded))
+            film.save(exr, compression, layers=chosen and layers_of(chosen, film), multipart=multipart)
             if preview is not None:
                 film.save_preview(preview)
             if checkpoint is not None or resume:
@@ -191,14 +198,25 @@ def render_command(
 
 
 def _chosen_layers(aov: list[str] | None) -> list[str] | None:
-    """The layers of `--aov`, the beauty first; None for all."""
+    """The AOVs of `--aov`, the beauty first; None for all that are made without being asked for."""
     if not aov:
         return None
-    from .._frazil import aov_table
+    from ..aovs import ALL, aov_names
 
-    known = tuple(row["name"] for row in aov_table())
+    known = (*aov_names(), ALL)
     names = [one_of("--aov", name.strip(), known) for part in aov for name in part.split(",")]
-    return list(dict.fromkeys(["beauty", *names]))
+    for name in names:
+        if names.count(name) > 1:
+            raise misused("--aov", f"must name each layer once, got '{name}' twice.")
+    return list(dict.fromkeys(["beauty", *_without_all(names)]))
+
+
+def _without_all(names: list[str]) -> list[str]:
+    """The names, with `all` replaced by what it stands for."""
+    from ..aovs import ALL, aov_table
+
+    usual = [row["name"] for row in aov_table() if row["is_default"]]
+    return [other for name in names for other in (usual if name == ALL else [name])]
 
 
 def _jobs(

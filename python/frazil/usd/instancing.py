@@ -116,6 +116,7 @@ class StageWalker:
         parts = self._mesh_parts(prim, texcoord_name)
         if not parts:
             return
+        asset = _asset_of(prim)
         for matrix, path, is_flat in zip(matrices, paths, are_singular(matrices), strict=True):
             if is_flat:
                 self._context.warn(path, "its transform cannot be inverted (a scale of 0?). It is left out.")
@@ -123,7 +124,7 @@ class StageWalker:
             for mesh, subset in parts:
                 name = f"{path}/{subset}" if subset else path
                 matrix = np.ascontiguousarray(matrix)
-                index = self._scene.add_object(name, mesh, materials[subset].index, matrix)
+                index = self._scene.add_object(name, mesh, materials[subset].index, matrix, asset)
                 own = [prim.GetPath().AppendChild(subset)] if subset else []
                 self._links.add_object([*own, prim.GetPath(), *reversed([Sdf.Path(name) for name in inside])])
                 if is_light(prim):
@@ -226,3 +227,14 @@ class StageWalker:
             is_known &= np.asarray(mask, dtype=bool)
         numbers = np.flatnonzero(is_known)
         return numbers, own[numbers], prototypes[numbers]
+
+
+def _asset_of(prim: Usd.Prim) -> str:
+    """The path of what a leaf belongs to: the nearest instance or component, else what stands below the root prim."""
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if above.IsInstance() or Usd.ModelAPI(above).IsKind("component"):
+            return str(above.GetPath())
+        above = above.GetParent()
+    prefixes = prim.GetPath().GetPrefixes()
+    return str(prefixes[min(1, len(prefixes) - 1)])

@@ -19,6 +19,7 @@ nb::list aov_rows() {
         row["filter"] = aov.filter == AovFilter::average ? "average" : "nearest";
         row["is_additive"] = aov.is_additive;
         row["is_half"] = aov.is_half;
+        row["is_default"] = aov.is_default;
         rows.append(row);
     }
     return rows;
@@ -38,6 +39,35 @@ nb::dict layers_of(RenderResult& result, nb::handle owner) {
         layers[name.c_str()] = view(layer.pixels.data(), {height, width, std::size_t(layer.channels)}, owner);
     }
     return layers;
+}
+
+nb::list knots_of(const Film& film) {
+    nb::list knots;
+    const auto list = [](const Rgb& c) { return nb::make_tuple(c.x, c.y, c.z); };
+    for (const RampKnot& knot : film.knots) {
+        nb::dict row;
+        row["material"] = knot.material;
+        row["distance"] = knot.distance;
+        row["color"] = list(knot.color);
+        row["share"] = list(knot.share);
+        row["preserves_energy"] = knot.preserves_energy;
+        row["is_fixed"] = knot.is_fixed;
+        knots.append(row);
+    }
+    return knots;
+}
+
+nb::list compensations_of(const Film& film) {
+    nb::list rows;
+    constexpr const char* kNames[] = {"off", "ratio", "conserve", "fill", "linear"};
+    for (const RenderedCompensation& rendered : film.compensations) {
+        nb::dict row;
+        row["material"] = rendered.material;
+        row["mode"] = kNames[static_cast<int>(rendered.compensation.mode)];
+        row["strength"] = rendered.compensation.strength;
+        rows.append(row);
+    }
+    return rows;
 }
 
 nb::dict stats_of(const RenderStats& stats) {
@@ -154,6 +184,7 @@ void bind_options(nb::module_& module) {
         .def_rw("bake_error", &RenderOptions::bake_error)
         .def_rw("translucent_shadows", &RenderOptions::translucent_shadows)
         .def_rw("bake_bounces", &RenderOptions::bake_bounces)
+        .def_rw("aovs", &RenderOptions::aovs)
         .def_prop_rw(
             "tolerance", [](const RenderOptions& self) { return self.gather.tolerance; },
             [](RenderOptions& self, float tolerance) { self.gather.tolerance = tolerance; })
@@ -220,6 +251,16 @@ void bind_render(nb::module_& module) {
         .def_prop_ro(
             "layers", [](nb::handle self) { return layers_of(nb::cast<RenderResult&>(self), self); },
             "dict of AOV or layer name to (height, width, channels) float32; views of the film's own memory.")
+        .def_prop_ro(
+            "light_groups", [](const RenderResult& self) { return self.film.groups; },
+            "list of str: in the order of the layers; '' for lights without a group.")
+        .def_prop_ro(
+            "ramp_knots", [](const RenderResult& self) { return knots_of(self.film); },
+            "list of dict, one per layer translucency_ramp<K>: material, distance (metres), color, share of energy, "
+            "...")
+        .def_prop_ro(
+            "compensations", [](const RenderResult& self) { return compensations_of(self.film); },
+            "list of dict, one per material of ice: material, mode, strength.")
         .def_prop_ro(
             "stats", [](const RenderResult& self) { return stats_of(self.stats); },
             "dict: points, nodes, rays, gathers, dropped samples, seconds per stage.");

@@ -58,6 +58,7 @@ void bind_lighting(nb::module_& module);
 void bind_lights(nb::module_& module);
 void bind_scene(nb::module_& module);
 void bind_render(nb::module_& module);
+void bind_film(nb::module_& module);
 
 }  // namespace frazil
 

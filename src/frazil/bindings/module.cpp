@@ -52,4 +52,5 @@ NB_MODULE(_frazil, module) {
     bind_material(module);
     bind_scene(module);
     bind_render(module);
+    bind_film(module);
 }

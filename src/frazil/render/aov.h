@@ -4,6 +4,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace frazil {
@@ -20,11 +21,15 @@ struct Aov {
     AovFilter filter;
     bool is_additive;  // a part of the beauty
     bool is_half;      // stored as half in the EXR unless asked otherwise
+    bool is_default;   // made without being asked for
 };
 
 std::span<const Aov> aov_table();
 
 // The row of that name; nullptr where there is none.
 const Aov* find_aov(std::string_view name);
+
+// ValueError for a name that is not in the table, or is there twice.
+void check_aovs(std::span<const std::string> names);
 
 }  // namespace frazil

@@ -45,6 +45,7 @@ void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, std::vec
         if (!bodies[i] || lit[i].points.size() == 0) continue;
         bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups,
                                                             bodies[i]->profile, bodies[i]->material->ramp);
+        bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();
     }

@@ -24,6 +24,7 @@ struct Body {
     Profile profile;
     Rgb total_reflectance = Rgb(0.0f);      // Rd_total
     std::unique_ptr<const PointTree> tree;  // none where the object has no surface
+    float spacing = 0.0f;                   // of its points
 
     // What the boundary lets in (and out) at this angle; its mean over all directions; for one user roughness.
     float transmittance(float cos_theta, float roughness) const;

@@ -29,41 +29,77 @@ void scale(float* layer, std::size_t film_pixel, float factor) {
 
 }  // namespace
 
-FilmSums::FilmSums(int width, int height, const std::vector<std::string>& groups) : group_count_(groups.size()) {
+FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(layout) {
     film_.width = width;
     film_.height = height;
-    for (const Aov& aov : aov_table()) add_layer(std::string(aov.name), aov.channels.size());
-    for (const char* component : kComponentNames) {
-        component_pixels_.push_back(pixels(component));
-        if (group_count_ < 2) continue;
-        for (const std::string& group : groups) {
-            const std::string name = str(component, "_", group.empty() ? "default" : group);
-            add_layer(name, 3);
-            group_pixels_.push_back(pixels(name));
-        }
-    }
-    beauty_ = pixels("beauty"), depth_ = pixels("Z"), object_id_ = pixels("object_id");
-    normal_ = pixels("N"), position_ = pixels("P"), coverage_ = pixels("coverage"), albedo_ = pixels("albedo");
-    sample_count_ = pixels("sample_count"), variance_ = pixels("variance");
+    film_.groups = layout.groups;
+    film_.knots = layout.knots;
+    film_.compensations = layout.compensations;
+    for (const char* component : kComponentNames) components_.push_back(add_grouped(component));
+    for (std::size_t p = 0; p < layout.plane_count(); ++p) planes_.push_back(add_grouped(layout.plane_name(p)));
+    beauty_ = utility("beauty"), depth_ = utility("Z"), object_id_ = utility("object_id");
+    normal_ = utility("N"), position_ = utility("P"), coverage_ = utility("coverage"), albedo_ = utility("albedo");
+    sample_count_ = utility("sample_count"), variance_ = utility("variance");
+    uv_ = utility("uv"), local_position_ = utility("Pref"), material_id_ = utility("material_id");
+    instance_id_ = utility("instance_id"), point_spacing_ = utility("point_spacing");
+    lacking_ = utility("compensation_factor");
     const std::size_t count = std::size_t(width) * height;
+    id_slots_.assign(layout.ids.size(), std::vector<float>(count * kIdSlots * 2, 0.0f));
     std::fill(depth_, depth_ + count, std::numeric_limits<float>::infinity());
     samples_.assign(count, 0.0f);
     subsets_.assign(count * kSampleSubsets, 0.0f);
 }
 
-void FilmSums::add_layer(const std::string& name, std::size_t channels) {
+float* FilmSums::add_layer(const std::string& name, std::size_t channels) {
     Layer& layer = film_.layers[name];
     layer.channels = static_cast<int>(channels);
     layer.pixels.resize(std::size_t(film_.width) * film_.height * channels);
+    return layer.pixels.data();
+}
+
+FilmSums::GroupedLayer FilmSums::add_grouped(const std::string& name) {
+    GroupedLayer layer;
+    layer.whole = add_layer(name, 3);
+    if (layout_.groups.size() < 2) return layer;
+    for (std::size_t group = 0; group < layout_.groups.size(); ++group) {
+        layer.parts.push_back(add_layer(layout_.group_name(name, group), 3));
+    }
+    return layer;
+}
+
+float* FilmSums::utility(const char* name) {
+    return layout_.has(name) ? add_layer(name, find_aov(name)->channels.size()) : nullptr;
+}
+
+void FilmSums::increase_grouped(const GroupedLayer& layer, std::size_t film_pixel, const Rgb* groups) {
+    if (layer.parts.empty()) return increase(layer.whole, film_pixel, groups[0]);
+    for (std::size_t g = 0; g < layer.parts.size(); ++g) increase(layer.parts[g], film_pixel, groups[g]);
+}
+
+// The average over samples; the whole is the sum of what was written to the parts.
+Rgb FilmSums::finish_grouped(const GroupedLayer& layer, std::size_t film_pixel, float factor) {
+    const auto pixel = [&](const float* of) {
+        return Rgb(of[3 * film_pixel], of[3 * film_pixel + 1], of[3 * film_pixel + 2]);
+    };
+    if (layer.parts.empty()) {
+        scale(layer.whole, film_pixel, factor);
+    } else {
+        Rgb sum(0.0f);
+        for (float* part : layer.parts) {
+            scale(part, film_pixel, factor);
+            sum += pixel(part);
+        }
+        set(layer.whole, film_pixel, sum);
+    }
+    return pixel(layer.whole);
 }
 
 void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pixel, int samples) {
-    for (std::size_t component = 0; component < kComponentCount; ++component) {
-        for (std::size_t group = 0; group < group_count_; ++group) {
-            float* layer =
-                group_count_ > 1 ? group_pixels_[component * group_count_ + group] : component_pixels_[component];
-            increase(layer, film_pixel, tile.light(tile_pixel, component, group));
-        }
+    for (std::size_t component = 0; component < components_.size(); ++component) {
+        increase_grouped(components_[component], film_pixel, &tile.light(tile_pixel, component, 0));
+    }
+    for (std::size_t p = 0; p < planes_.size(); ++p) {
+        increase_grouped(planes_[p], film_pixel, tile.plane(tile_pixel, p));
     }
     for (int subset = 0; subset < kSampleSubsets; ++subset) {
         subsets_[film_pixel * kSampleSubsets + subset] += tile.subset_luminance(tile_pixel, subset);
@@ -76,6 +112,17 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
         set(position_, film_pixel, nearest.position);
         depth_[film_pixel] = nearest.depth;
         object_id_[film_pixel] = static_cast<float>(nearest.object_id);
+        const std::size_t object = nearest.object_id - 1;
+        if (uv_) uv_[2 * film_pixel] = nearest.st.x, uv_[2 * film_pixel + 1] = nearest.st.y;
+        if (local_position_) set(local_position_, film_pixel, nearest.local_position);
+        if (material_id_) material_id_[film_pixel] = layout_.material_id[object];
+        if (instance_id_) instance_id_[film_pixel] = layout_.instance_id[object];
+        if (point_spacing_) point_spacing_[film_pixel] = layout_.point_spacing[object];
+    }
+    if (lacking_) increase(lacking_, film_pixel, tile.lacking(tile_pixel));
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) {
+        const FilmLayout::Ids& ids = layout_.ids[i];
+        add_ids(tile.objects(tile_pixel, ids.seen_through), ids.of_object, &id_slots_[i][film_pixel * kIdSlots * 2]);
     }
     samples_[film_pixel] += static_cast<float>(samples);
 }
@@ -149,25 +196,13 @@ Film FilmSums::finish() {
         for (std::size_t i = begin; i < end; ++i) {
             const float factor = samples_[i] > 0.0f ? 1.0f / samples_[i] : 0.0f;
             Rgb beauty(0.0f);
-            for (std::size_t component = 0; component < kComponentCount; ++component) {
-                float* whole = component_pixels_[component];
-                if (group_count_ < 2) {
-                    scale(whole, i, factor);
-                } else {
-                    Rgb sum(0.0f);
-                    for (std::size_t group = 0; group < group_count_; ++group) {
-                        float* part = group_pixels_[component * group_count_ + group];
-                        scale(part, i, factor);
-                        sum += Rgb(part[3 * i], part[3 * i + 1], part[3 * i + 2]);
-                    }
-                    set(whole, i, sum);
-                }
-                beauty += Rgb(whole[3 * i], whole[3 * i + 1], whole[3 * i + 2]);
-            }
+            for (const GroupedLayer& layer : components_) beauty += finish_grouped(layer, i, factor);
+            for (const GroupedLayer& layer : planes_) finish_grouped(layer, i, factor);
             const float hits = beauty_[4 * i + 3];
             scale(normal_, i, hits > 0.0f ? 1.0f / hits : 0.0f);
             scale(albedo_, i, factor);
             scale(coverage_, i, factor);
+            if (lacking_) scale(lacking_, i, factor);
             float* pixel = beauty_ + 4 * i;
             pixel[0] = beauty.x, pixel[1] = beauty.y, pixel[2] = beauty.z, pixel[3] = hits * factor;
             sample_count_[i] = samples_[i];
@@ -175,12 +210,30 @@ Film FilmSums::finish() {
             variance_[i] = std::isfinite(variance) ? variance : 0.0f;
         }
     });
+    finish_ids();
     return std::move(film_);
+}
+
+// Three layers of two ranks for each Cryptomatte.
+void FilmSums::finish_ids() {
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) {
+        std::array<float*, kIdRanks / 2> layers;
+        for (int k = 0; k < kIdRanks / 2; ++k) layers[k] = add_layer(str(layout_.ids[i].aov, "0", k), 4);
+        parallel_for(samples_.size(), kRowsPerChunk * film_.width, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t pixel = begin; pixel < end; ++pixel) {
+                const float factor = samples_[pixel] > 0.0f ? 1.0f / samples_[pixel] : 0.0f;
+                std::array<float, 2 * kIdRanks> ranks;
+                write_ranks(&id_slots_[i][pixel * kIdSlots * 2], factor, ranks.data());
+                for (int k = 0; k < 2 * kIdRanks; ++k) layers[k / 4][4 * pixel + k % 4] = ranks[k];
+            }
+        });
+    }
 }
 
 FilmState FilmSums::state() {
     FilmState result;
     for (auto& [name, layer] : film_.layers) result["layer." + name] = layer.pixels;
+    for (std::size_t i = 0; i < id_slots_.size(); ++i) result["ids." + layout_.ids[i].aov] = id_slots_[i];
     result["samples"] = samples_;
     result["subsets"] = subsets_;
     return result;

@@ -1,5 +1,5 @@
 // A film while it is rendered: sums over the samples so far, pixel by pixel, and how noisy they still are.
-// Model: additive layers are summed per component and light group; finish() divides by each pixel's samples and makes the
+// Model: additive layers and planes of translucency (FilmLayout) are summed per light group; finish() divides by each pixel's samples and makes the
 //   beauty their sum. Noise is the standard error of the beauty's luminance, from the spread of kSampleSubsets
 //   interleaved subsets of a pixel's samples, averaged over 5x5 pixels.
 // Units: by AOV.
@@ -12,13 +12,15 @@
 
 #include "frazil/render/checkpoint.h"
 #include "frazil/render/film.h"
+#include "frazil/render/film_layout.h"
 #include "frazil/render/tile.h"
 
 namespace frazil {
 
 class FilmSums {
   public:
-    FilmSums(int width, int height, const std::vector<std::string>& groups);
+    // `layout` must outlive the sums.
+    FilmSums(int width, int height, const FilmLayout& layout);
     FilmSums(const FilmSums&) = delete;
     FilmSums& operator=(const FilmSums&) = delete;
 
@@ -38,14 +40,26 @@ class FilmSums {
     FilmState state();
 
   private:
-    void add_layer(const std::string& name, std::size_t channels);
-    float* pixels(const std::string& name) { return film_.layers.at(name).pixels.data(); }
+    // A layer that is the sum of its parts by light group; without parts where there is one group.
+    struct GroupedLayer {
+        float* whole = nullptr;
+        std::vector<float*> parts;
+    };
+
+    float* add_layer(const std::string& name, std::size_t channels);
+    GroupedLayer add_grouped(const std::string& name);
+    void finish_ids();
+    float* utility(const char* name);  // null where the layout does not have it
+    void increase_grouped(const GroupedLayer& layer, std::size_t film_pixel, const Rgb* groups);
+    static Rgb finish_grouped(const GroupedLayer& layer, std::size_t film_pixel, float factor);
     float luminance_of_mean(std::size_t film_pixel) const;
     float variance_of_mean(std::size_t film_pixel) const;
 
-    std::size_t group_count_;
+    const FilmLayout& layout_;
     Film film_;
-    std::vector<float*> component_pixels_, group_pixels_;  // by component; by component and group
+    std::vector<GroupedLayer> components_, planes_;
+    std::vector<std::vector<float>> id_slots_;  // by Cryptomatte: (pixels, kIdSlots, 2)
+    float *uv_, *local_position_, *material_id_, *instance_id_, *point_spacing_, *lacking_;  // null where not asked for
     float *beauty_, *depth_, *object_id_, *normal_, *position_, *coverage_, *albedo_, *sample_count_, *variance_;
     std::vector<float> samples_;  // per pixel; exact up to 2^24
     std::vector<float> subsets_;  // (pixels, kSampleSubsets): sums of the beauty's luminance

@@ -30,6 +30,7 @@ struct RenderOptions {
     bool translucent_shadows = false;
     int bake_bounces = 1;  // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
+    std::vector<std::string> aovs;  // of the table, beside those that are made anyway
 };
 
 struct RenderStats {

@@ -77,6 +77,7 @@ struct PathTracer::Path {
     // Who receives light at the last vertex (the camera: everything), and which multipliers weigh in the choice there.
     LightReceiver receiver;
     LightUse use = LightUse::surface;
+    bool has_shown = false;   // what is seen through ice
     bool has_passed = false;  // through a surface without a lobe, since then
     // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
     // that they have not served.
@@ -153,12 +154,13 @@ struct PathTracer::Path {
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-                       int max_bounces)
+                       const FilmLayout& layout, int max_bounces)
     : scene_(scene),
       ray_scene_(ray_scene),
       lights_(lights),
       bodies_(bodies),
       group_of_light_(group_of_light),
+      layout_(layout),
       resolver_(scene),
       interiors_(scene, ray_scene, resolver_, bodies),
       single_scattering_(lights, interiors_, bodies),
@@ -205,7 +207,9 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
-            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1});
+            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1,
+                                          surface.st, surface.local_position});
+            tile.add_object(path.pixel, surface.object, false);
             view_axis = nullptr;
         };
         const Body* body = bodies_[surface.object].get();
@@ -240,12 +244,16 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             }
         }
         note_primary(shader.albedo(wo));
+        if (path.bounce > 0 && path.scattered == 0 && !path.has_shown) {
+            path.has_shown = true;
+            tile.add_object(path.pixel, surface.object, true);
+        }
 
         // What the surface itself gives: emission where no mesh light stands for it, and light that diffused through ice.
         const int own_light = lights_.light_of_object(surface.object);
         const bool is_own = own_light < 0 || (path.bounce == 0 && lights_.is_material(own_light));
         if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
-            const std::size_t group = own_light < 0 ? 0 : group_of_light_[std::size_t(own_light)];
+            const std::size_t group = own_light < 0 ? layout_.emission_group : group_of_light_[std::size_t(own_light)];
             deliver(path, Component::emission, path.weights(), group, emission, tile);
         }
         float reflection_odds = 1.0f;
@@ -582,10 +590,13 @@ void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& s
 
 void PathTracer::add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const {
     const IceMaterial& ice = *body.material;
-    if (ice.compensation.mode != CompensationMode::fill) return;
-    const float u_pick = sampler.next_1d();
+    const bool fills = ice.compensation.mode == CompensationMode::fill;
+    if (!fills && !(core.is_primary && layout_.needs_fill())) return;
+    Sampler copy = sampler;  // a layer that is asked for must not change the picture
+    Sampler& own = fills ? sampler : copy;
+    const float u_pick = own.next_1d();
     const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
-    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d(), LightUse::translucency);
+    const LightSample sample = lights_.sample(receiver, u_pick, own.next_2d(), LightUse::translucency);
     const float cosine = surface.normal.dot(sample.direction);
     const Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
@@ -609,7 +620,9 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
         for (; end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object; ++end) {
             positions.push_back(tile.requests[end].position);
         }
-        const Gathered gathered = body.tree->gather(positions.data(), positions.size(), options);
+        GatherOptions with_layers = options;
+        with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
+        const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
@@ -626,11 +639,52 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
                 tile.add(request.pixel, Component::specular, group, exitance * request.specular);
                 tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
             }
-            if (request.is_primary) tile.add_coverage(request.pixel, coverage);
+            if (request.is_primary) {
+                const Rgb& total = body.total_reflectance;
+                Rgb lacking(0.0f);
+                for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
+                tile.add_coverage(request.pixel, coverage, lacking);
+            }
+            if (request.is_primary && layout_.plane_count() > 0) add_planes(request, gathered, i - begin, tile);
         }
         begin = end;
     }
     tile.requests.clear();
+}
+
+// Translucency once more, apart by ramp knot and as every compensation mode that was asked for would have it.
+void PathTracer::add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, Tile& tile) const {
+    const Body& body = *bodies_[request.object];
+    const Compensation& rendered = body.material->compensation;
+    const Rgb &coverage = gathered.coverage[row], &weight = request.translucency;
+    const auto fill_of = [&](const Compensation& compensation) {
+        return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
+    };
+    if (!layout_.knots.empty()) {
+        const Rgb scale = compensation_gain(rendered, coverage, body.total_reflectance) * weight;
+        const std::size_t first = layout_.first_knot[scene_.objects[request.object].material];
+        for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
+            const Rgb* light = gathered.knots > 0 ? &gathered.layers[(row * gathered.knots + k) * gathered.groups]
+                                                  : &gathered.exitance[row * gathered.groups];
+            for (std::size_t g = 0; g < gathered.groups; ++g) {
+                tile.add_to_plane(request.pixel, first + k, g, light[g] * scale);
+            }
+        }
+        if (layout_.fill_plane != FilmLayout::kNone) {
+            tile.add_to_plane(request.pixel, layout_.fill_plane, request.entering_group, fill_of(rendered));
+        }
+    }
+    for (std::size_t m = 0; m < layout_.modes.size(); ++m) {
+        Compensation full = rendered;
+        full.mode = layout_.modes[m];
+        full.strength = 1.0f;
+        const std::size_t plane = layout_.knots.size() + m;
+        const Rgb scale = compensation_gain(full, coverage, body.total_reflectance) * weight;
+        for (std::size_t g = 0; g < gathered.groups; ++g) {
+            tile.add_to_plane(request.pixel, plane, g, gathered.exitance[row * gathered.groups + g] * scale);
+        }
+        tile.add_to_plane(request.pixel, plane, request.entering_group, fill_of(full));
+    }
 }
 
 }  // namespace frazil

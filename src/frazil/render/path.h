@@ -15,6 +15,7 @@
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/light_sampling.h"
 #include "frazil/render/bodies.h"
+#include "frazil/render/film_layout.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
@@ -28,7 +29,7 @@ class PathTracer {
     // Everything must outlive the tracer. `group_of_light` gives each light's index among the light groups.
     PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-               int max_bounces);
+               const FilmLayout& layout, int max_bounces);
 
     // Trace one sample. `sampler` stands after the camera's own dimensions.
     void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
@@ -64,12 +65,14 @@ class PathTracer {
                        Tile& tile) const;
     void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
     void add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const;
+    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, Tile& tile) const;
 
     const Scene& scene_;
     const RayScene& ray_scene_;
     const LightSampler& lights_;
     const std::vector<std::unique_ptr<Body>>& bodies_;
     const std::vector<std::size_t>& group_of_light_;
+    const FilmLayout& layout_;
     SurfaceResolver resolver_;
     Interiors interiors_;
     SingleScattering single_scattering_;

@@ -8,6 +8,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
+#include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/path.h"
 #include "frazil/render/stopwatch.h"
@@ -40,9 +41,9 @@ RayScene make_ray_scene(const Scene& scene, const RenderOptions& options, Render
 // The picture in the making: its sums, and which tiles and pixels the running pass still has to serve.
 class Canvas {
   public:
-    Canvas(const RenderOptions& options, const std::vector<std::string>& groups)
+    Canvas(const RenderOptions& options, const FilmLayout& layout)
         : options_(options),
-          sums_(options.width, options.height, groups),
+          sums_(options.width, options.height, layout),
           tiles_x_((options.width + kTileSize - 1) / kTileSize),
           tiles_y_((options.height + kTileSize - 1) / kTileSize),
           is_wanted_(std::size_t(options.width) * options.height, 1.0f),
@@ -202,6 +203,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
 RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
                              const Checkpoints* checkpoints) {
     RenderStats stats;
+    FilmLayout layout = make_layout(scene, options.aovs);
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
@@ -215,15 +217,18 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
-    const std::vector<std::size_t> group_of_light = groups_of(scene.lights, groups);
-    const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, options.max_bounces);
+    const std::vector<std::size_t> group_of_light = groups_of(scene.lights, layout.groups);
+    const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces);
     for (const std::string& warning : tracer.warnings()) stats.warnings.push_back(warning);
     const FilterSampler filter(options.filter);
     V3f view_axis;
     scene.camera.camera_to_world.multDirMatrix(V3f(0.0f, 0.0f, -1.0f), view_axis);
     view_axis.normalize();
 
-    Canvas canvas(options, groups);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i]) layout.point_spacing[i] = bodies[i]->spacing;
+    }
+    Canvas canvas(options, layout);
     if (checkpoints && checkpoints->resume_from) canvas.resume(*checkpoints->resume_from);
     CheckpointClock clock(checkpoints);
     std::atomic<std::uint64_t> camera_rays = 0, rays = 0, gathers = 0, dropped = 0, done = 0;
@@ -231,7 +236,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
         do {
             const std::vector<std::size_t> open = canvas.open_tiles();
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
-                Tile tile(kTileSize * kTileSize, groups.size());
+                Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count());
                 render_tile(scene, options, tracer, view_axis, filter, canvas, open[i], tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);

@@ -26,6 +26,7 @@ struct Object {
     std::uint32_t mesh = 0;
     std::uint32_t material = 0;
     M44f local_to_world;
+    std::string asset;  // what it belongs to, for Cryptomatte; empty = the object itself
 };
 
 struct Scene {

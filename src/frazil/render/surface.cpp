@@ -56,6 +56,7 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction) const {
     const V3i& triangle = mesh.triangles[hit.triangle];
     const V3f local = mesh.positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) +
                       mesh.positions[triangle.y] * hit.uv.x + mesh.positions[triangle.z] * hit.uv.y;
+    surface.local_position = local;
     surface.position = local * object.local_to_world;
 
     const V3f wo = -direction;

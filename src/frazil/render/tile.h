@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/render/cryptomatte.h"
 
 namespace frazil {
 
@@ -31,6 +32,8 @@ struct PrimaryHit {
     V3f position = V3f(0.0f), normal = V3f(0.0f);
     Rgb albedo = Rgb(0.0f);
     std::uint32_t object_id = 0;
+    V2f st = V2f(0.0f);
+    V3f local_position = V3f(0.0f);
 };
 
 // Exitance wanted at a place on ice, and what becomes of it.
@@ -50,15 +53,20 @@ struct GatherRequest {
 
 class Tile {
   public:
-    Tile(std::size_t pixels, std::size_t groups)
+    // `planes` of translucency beside the components: see FilmLayout.
+    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0)
         : groups_(groups),
+          plane_count_(planes),
           light_(pixels * kComponentCount * groups, Rgb(0.0f)),
+          planes_(pixels * planes * groups, Rgb(0.0f)),
           luminance_(pixels * kSampleSubsets),
           normal_(pixels, V3f(0.0f)),
           albedo_(pixels, Rgb(0.0f)),
           coverage_(pixels, Rgb(0.0f)),
+          lacking_(pixels, Rgb(0.0f)),
           hits_(pixels),
-          nearest_(pixels) {}
+          nearest_(pixels),
+          objects_(2 * pixels) {}
 
     void add(std::size_t pixel, Component component, std::size_t group, const Rgb& radiance) {
         if (!is_finite(radiance)) {
@@ -69,6 +77,15 @@ class Tile {
         luminance_[pixel * kSampleSubsets + subset] += luminance(radiance);
     }
 
+    void add_to_plane(std::size_t pixel, std::size_t plane, std::size_t group, const Rgb& radiance) {
+        if (is_finite(radiance)) planes_[(pixel * plane_count_ + plane) * groups_ + group] += radiance;
+    }
+
+    // What a sample shows first; `seen_through` ice or directly.
+    void add_object(std::size_t pixel, std::uint32_t object, bool seen_through) {
+        count_id(objects_[seen_through ? hits_.size() + pixel : pixel], object);
+    }
+
     void add_primary(std::size_t pixel, const PrimaryHit& hit) {
         normal_[pixel] += hit.normal;
         albedo_[pixel] += hit.albedo;
@@ -76,7 +93,10 @@ class Tile {
         if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
     }
 
-    void add_coverage(std::size_t pixel, const Rgb& coverage) { coverage_[pixel] += coverage; }
+    void add_coverage(std::size_t pixel, const Rgb& coverage, const Rgb& lacking) {
+        coverage_[pixel] += coverage;
+        lacking_[pixel] += lacking;
+    }
 
     const Rgb& light(std::size_t pixel, std::size_t component, std::size_t group) const {
         return light_[(pixel * kComponentCount + component) * groups_ + group];
@@ -85,8 +105,16 @@ class Tile {
         return luminance_[pixel * kSampleSubsets + of_subset];
     }
     const Rgb& albedo(std::size_t pixel) const { return albedo_[pixel]; }
+    // One value per light group.
+    const Rgb* plane(std::size_t pixel, std::size_t plane) const {
+        return &planes_[(pixel * plane_count_ + plane) * groups_];
+    }
     const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
     const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
+    const Rgb& lacking(std::size_t pixel) const { return lacking_[pixel]; }
+    const IdCounts& objects(std::size_t pixel, bool seen_through) const {
+        return objects_[seen_through ? hits_.size() + pixel : pixel];
+    }
     std::uint32_t hits(std::size_t pixel) const { return hits_[pixel]; }
     const PrimaryHit& nearest(std::size_t pixel) const { return nearest_[pixel]; }
 
@@ -95,14 +123,15 @@ class Tile {
     std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
   private:
-    std::size_t groups_;
-    std::vector<Rgb> light_;
+    std::size_t groups_, plane_count_;
+    std::vector<Rgb> light_, planes_;
     std::vector<float> luminance_;
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;
-    std::vector<Rgb> coverage_;
+    std::vector<Rgb> coverage_, lacking_;
     std::vector<std::uint32_t> hits_;
     std::vector<PrimaryHit> nearest_;
+    std::vector<IdCounts> objects_;  // per pixel, seen directly; then once more, seen through ice
 };
 
 }  // namespace frazil

@@ -1,0 +1,158 @@
+#include "frazil/render/film_layout.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "frazil/base/error.h"
+#include "frazil/lighting/irradiance.h"
+#include "frazil/render/cryptomatte.h"
+
+namespace frazil {
+namespace {
+
+struct ModeName {
+    CompensationMode mode;
+    const char* aov;
+};
+constexpr ModeName kModes[] = {{CompensationMode::off, "compensation_off"},
+                               {CompensationMode::ratio, "compensation_ratio"},
+                               {CompensationMode::conserve, "compensation_conserve"},
+                               {CompensationMode::fill, "compensation_fill"},
+                               {CompensationMode::linear, "compensation_linear"}};
+
+// Does the object emit light that belongs to no light?
+bool emits(const Scene& scene, std::size_t object) {
+    for (const Light& light : scene.lights) {
+        const auto* mesh = std::get_if<MeshLight>(&light.shape);
+        if (mesh && mesh->object == object) return false;
+    }
+    const auto* standard = std::get_if<StandardMaterial>(&scene.materials[scene.objects[object].material].model);
+    return standard && (standard->emissive_color.lookup.texture || standard->emissive_color.value != Rgb(0.0f));
+}
+
+// Which share of the profile's energy lies under the hat of knot k, per channel.
+Rgb share_of_knot(const Ramp& ramp, std::size_t k, const Profile& profile) {
+    // energy_scale of a ramp that is 1 everywhere and 2 at the knot is 1 / (1 + share).
+    Ramp raised{ramp.distances, std::vector<Rgb>(ramp.distances.size(), Rgb(1.0f)), true};
+    raised.colors[k] = Rgb(2.0f);
+    const Rgb scale = energy_scale(raised, profile);
+    return {1.0f / scale.x - 1.0f, 1.0f / scale.y - 1.0f, 1.0f / scale.z - 1.0f};
+}
+
+void add_knots(const Scene& scene, FilmLayout& layout) {
+    layout.first_knot.assign(scene.materials.size(), FilmLayout::kNone);
+    bool fills = false;
+    for (const Object& object : scene.objects) {
+        const auto* ice = std::get_if<IceMaterial>(&scene.materials[object.material].model);
+        if (!ice || layout.first_knot[object.material] != FilmLayout::kNone) continue;
+        const std::string& path = scene.materials[object.material].path;
+        layout.first_knot[object.material] = layout.knots.size();
+        fills = fills || ice->compensation.mode == CompensationMode::fill;
+        if (ice->ramp.is_empty()) {
+            layout.knots.push_back({path, 0.0f, Rgb(1.0f), Rgb(1.0f), false, true});
+            continue;
+        }
+        const Profile profile = Dipole(ice->medium);
+        for (std::size_t k = 0; k < ice->ramp.distances.size(); ++k) {
+            layout.knots.push_back({path, ice->ramp.distances[k], ice->ramp.colors[k],
+                                    share_of_knot(ice->ramp, k, profile), ice->ramp.preserve_energy, false});
+        }
+    }
+    if (!fills) return;
+    layout.fill_plane = layout.knots.size();
+    layout.knots.push_back({"", 0.0f, Rgb(1.0f), Rgb(1.0f), false, true});
+}
+
+// Would the layers of a group of this name be taken for those of a ramp's knots?
+bool is_taken(const std::string& group) {
+    if (find_aov("translucency_" + group)) return true;
+    const std::string_view ramp = "ramp";
+    return group.compare(0, ramp.size(), ramp) == 0 && group.size() > ramp.size() &&
+           std::isdigit(static_cast<unsigned char>(group[ramp.size()]));
+}
+
+void add_ids(const Scene& scene, FilmLayout& layout) {
+    std::vector<std::uint32_t> placed(scene.meshes.size(), 0);
+    for (const Object& object : scene.objects) {
+        layout.material_id.push_back(1.0f + static_cast<float>(object.material));
+        layout.instance_id.push_back(static_cast<float>(++placed[object.mesh]));
+    }
+    layout.point_spacing.assign(scene.objects.size(), 0.0f);
+    const auto add = [&](const std::string& kind, const auto& name_of) {
+        for (const bool seen_through : {false, true}) {
+            const std::string name = (seen_through ? "crypto_refracted_" : "crypto_") + kind;
+            if (!layout.has(name)) continue;
+            FilmLayout::Ids ids{name, seen_through, {}};
+            for (const Object& object : scene.objects) ids.of_object.push_back(cryptomatte_id(name_of(object)));
+            layout.ids.push_back(std::move(ids));
+        }
+    };
+    add("object", [](const Object& object) -> const std::string& { return object.path; });
+    add("material", [&](const Object& object) -> const std::string& { return scene.materials[object.material].path; });
+    add("asset",
+        [](const Object& object) -> const std::string& { return object.asset.empty() ? object.path : object.asset; });
+}
+
+}  // namespace
+
+bool FilmLayout::has(std::string_view aov) const {
+    return std::find(aovs.begin(), aovs.end(), aov) != aovs.end();
+}
+
+bool FilmLayout::needs_fill() const {
+    return std::find(modes.begin(), modes.end(), CompensationMode::fill) != modes.end();
+}
+
+std::string FilmLayout::plane_name(std::size_t plane) const {
+    if (plane < knots.size()) return str("translucency_ramp", plane);
+    for (const ModeName& named : kModes) {
+        if (named.mode == modes[plane - knots.size()]) return named.aov;
+    }
+    return {};
+}
+
+std::string FilmLayout::group_name(const std::string& layer, std::size_t group) const {
+    return str(layer, "_", groups[group].empty() ? "default" : groups[group]);
+}
+
+FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs) {
+    check_aovs(extra_aovs);
+    FilmLayout layout;
+    for (const Aov& aov : aov_table()) {
+        const bool is_asked = std::find(extra_aovs.begin(), extra_aovs.end(), aov.name) != extra_aovs.end();
+        if (aov.is_default || is_asked) layout.aovs.emplace_back(aov.name);
+    }
+
+    layout.groups = light_groups(scene.lights);
+    for (const std::string& group : layout.groups) {
+        if (is_taken(group)) {
+            throw ValueError(str("render: a light group must not be named '", group, "': layer translucency_", group,
+                                 " would be another one. Rename the group."));
+        }
+    }
+    // What surfaces emit must not change with the lights of a group.
+    const auto unnamed = std::find(layout.groups.begin(), layout.groups.end(), "");
+    layout.emission_group = static_cast<std::size_t>(unnamed - layout.groups.begin());
+    if (unnamed == layout.groups.end()) {
+        bool is_needed = false;
+        for (std::size_t i = 0; i < scene.objects.size() && !is_needed; ++i) is_needed = emits(scene, i);
+        layout.emission_group = is_needed ? layout.groups.size() : 0;
+        if (is_needed) layout.groups.emplace_back();
+    }
+
+    std::vector<char> is_known(scene.materials.size(), 0);
+    for (const Object& object : scene.objects) {
+        const Material& material = scene.materials[object.material];
+        const auto* ice = std::get_if<IceMaterial>(&material.model);
+        if (ice && !is_known[object.material]) layout.compensations.push_back({material.path, ice->compensation});
+        is_known[object.material] = 1;
+    }
+    add_ids(scene, layout);
+    if (layout.has("translucency_ramp")) add_knots(scene, layout);
+    for (const ModeName& named : kModes) {
+        if (layout.has(named.aov)) layout.modes.push_back(named.mode);
+    }
+    return layout;
+}
+
+}  // namespace frazil

@@ -1,0 +1,54 @@
+// Which layers a film gets: decided once per render, read by the paths that fill them and by the film that keeps them.
+// Model: additive light per component and light group always; "planes" of translucency beside it, each per group too:
+//   one per ramp knot and one per compensation mode that was asked for.
+// Valid: light groups have names that cannot be taken for another layer's: make_layout refuses the others.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "frazil/render/film.h"
+#include "frazil/render/scene.h"
+
+namespace frazil {
+
+struct FilmLayout {
+    std::vector<std::string> aovs;    // of the table, those that are made
+    std::vector<std::string> groups;  // one at least
+    std::size_t emission_group = 0;   // which takes light that surfaces emit
+
+    std::vector<RenderedCompensation> compensations;  // one per material of ice that is in use
+
+    // Cryptomattes: layers <aov>00, 01, 02.
+    struct Ids {
+        std::string aov;
+        bool seen_through;             // ice, or directly
+        std::vector<float> of_object;  // by object
+    };
+    std::vector<Ids> ids;
+
+    // By object: 1 + its material, 1 + its number among those of its mesh, the spacing of its points (bodies fill it in).
+    std::vector<float> material_id, instance_id, point_spacing;
+
+    // Planes: knots first, then modes.
+    std::vector<RampKnot> knots;
+    std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers
+    std::size_t fill_plane = kNone;       // the knot plane of what `fill` adds
+    std::vector<CompensationMode> modes;
+
+    static constexpr std::size_t kNone = ~std::size_t(0);
+
+    std::size_t plane_count() const { return knots.size() + modes.size(); }
+    bool has(std::string_view aov) const;
+    bool needs_fill() const;  // the light that enters at shading points, for a plane of the compensation `fill`
+
+    // Layer names: of a component or plane, and of one of its light groups.
+    std::string plane_name(std::size_t plane) const;
+    std::string group_name(const std::string& layer, std::size_t group) const;
+};
+
+// ValueError for AOVs that are unknown or twice there, and for light groups whose layers would be other layers.
+FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs);
+
+}  // namespace frazil
