@@ -783,7 +783,7 @@ def light_groups(lights: Sequence[Light]) -> list[str]:
     is no light.
     """
 
-def bake_irradiance(points: object, scene: RayScene, lights: Sequence[Light], *, eta: float = 1.309999942779541, roughness: float = 0.0, samples: int = 64, seed: int = 0) -> object:
+def bake_irradiance(points: object, scene: RayScene, lights: Sequence[Light], *, eta: float = 1.31, roughness: float = 0.0, samples: int = 64, seed: int = 0, error: float = 0.0, max_rounds: int = 16, objects: Sequence[int] | None = None, return_error: bool = False) -> numpy.ndarray:
     """
     Irradiance that enters at points, with ray-traced shadows.
 
@@ -796,15 +796,46 @@ def bake_irradiance(points: object, scene: RayScene, lights: Sequence[Light], *,
     roughness : of the boundary, 0 to 1.
     samples : shadow rays per point and light.
     seed : changes the noise, not the expectation.
+    error : relative error (one standard deviation) at each point to which samples are added; 0 = none. Relative to what
+        arrives, or to a tenth of what would arrive if nothing were in the way, whichever is larger.
+    max_rounds : how many times `samples` a light may take at a point for that.
+    objects : of the scene, that the points lie on, for light linking: one each, one for all, or None.
+    return_error : return the estimated standard deviation of each point's luminance too.
 
     Returns
     -------
-    (N, G, 3) float32, W/m²: one row per light group, see light_groups.
+    (N, G, 3) float32, W/m²: one row per light group, see light_groups; with `return_error` a tuple of it and (N,).
 
     Raises
     ------
     ValueError
         For lights, points or options out of range, by name.
+    """
+
+def bake_occlusion(points: object, scene: RayScene, *, samples: int = 64, seed: int = 0, distance: float = float('inf')) -> tuple:
+    """
+    How much of the sky each point sees, by rays.
+
+    Parameters
+    ----------
+    points : PointSet, or any object with positions and normals (N, 3) float32, metres.
+    scene : RayScene that occludes. samples : rays per point. distance : metres within which things occlude.
+
+    Returns
+    -------
+    openness (N,) from 0 to 1, weighed by the cosine, and bent normals (N, 3): the mean open directions.
+
+    Raises
+    ------
+    ValueError
+        For options out of range.
+    """
+
+def point_occlusion(points: PointSet, *, distance: float = float('inf'), tolerance: float = 0.05000000074505806) -> tuple:
+    """
+    The same as bake_occlusion from the points alone, without rays: each hides as a disk of its area.
+
+    `tolerance` is the solid angle in steradian below which a cluster of points counts as one disk.
     """
 
 def measure_bake(points: object, scene: RayScene, lights: Sequence[Light], samples: int, is_bare: bool) -> tuple[int, float]:
@@ -1476,6 +1507,18 @@ class RenderOptions:
 
     @bake_samples.setter
     def bake_samples(self, arg: int, /) -> None: ...
+
+    @property
+    def bake_error(self) -> float: ...
+
+    @bake_error.setter
+    def bake_error(self, arg: float, /) -> None: ...
+
+    @property
+    def translucent_shadows(self) -> bool: ...
+
+    @translucent_shadows.setter
+    def translucent_shadows(self, arg: bool, /) -> None: ...
 
     @property
     def bake_bounces(self) -> int: ...

@@ -135,7 +135,7 @@ TEST_CASE("passages: a slab of ice takes Fresnel's share twice and what it absor
         const Ray ray{V3f(0.0f), V3f(std::sin(angle), 0.0f, std::cos(angle))};
         scene.set_passages({});
         CHECK(transmittance(scene, ray) == Rgb(0.0f));
-        scene.set_passages({{true, 1.31f, absorption}, {}});
+        scene.set_passages({{1.0f, 1.31f, absorption}, {}});
         const Rgb found = transmittance(scene, ray);
         const double through = 1.0 - double(fresnel_dielectric(std::cos(angle), 1.31f));
         for (int c = 0; c < 3; ++c) {
@@ -151,7 +151,7 @@ TEST_CASE("passages: a slab of ice takes Fresnel's share twice and what it absor
           doctest::Approx(once * std::exp(-0.05)).epsilon(1e-3));
     // In the bake.
     CHECK(irradiance_at({sun()}, 0.0f, scene).x == doctest::Approx(once * once * std::exp(-0.2)).epsilon(1e-3));
-    scene.set_passages({{true, 1.31f, absorption}, {}});
+    scene.set_passages({{1.0f, 1.31f, absorption}, {}});
     CHECK(transmittance(scene, {V3f(100, 0, 4), V3f(0, 0, 1)}) == Rgb(0.0f));
 }
 
@@ -237,4 +237,12 @@ TEST_CASE("render: a shining mesh is seen, lights the floor by the closed form, 
     scene.camera.camera_to_world[3][1] = 1.0f;
     const Film up = render(scene, small()).film;
     CHECK(mean_inside(up, "emission", 0) == doctest::Approx(1.0).epsilon(1e-4));
+}
+
+TEST_CASE("render: a light inside ice lights none of its outside, and nothing breaks") {
+    Scene scene = scene_of(sphere(1.0f, 3), ice(Rgb(0.2f), 1.31f, 0.3f, CompensationMode::ratio));
+    scene.lights = {make_light(SphereLight{0.2f})};
+    const Film film = render(scene, small()).film;
+    CHECK(mean_inside(film, "translucency", 0) == 0.0);
+    CHECK(std::isfinite(mean_inside(film, "beauty", 0)));
 }

@@ -131,3 +131,20 @@ def test_any_light_gives_finite_irradiance_of_at_most_pi(size, offset, kind):
     # A single estimate of few samples may overshoot where a sampler goes by area; by solid angle it cannot.
     if kind in (fz.RectLight, fz.SphereLight):
         assert (baked <= np.pi * 2.001).all()
+
+
+def test_errors_come_with_the_bake_and_fall_with_the_target():
+    light = fz.Light(fz.RectLight(1.0, 1.0), matrix=above(1.0), path="/key")
+    plain, errors = fz.bake_irradiance(grid(), roof(), [light], samples=16, return_error=True)
+    assert plain.shape == (64, 1, 3)
+    assert errors.shape == (64,)
+    _, adapted = fz.bake_irradiance(grid(), roof(), [light], samples=16, error=0.01, max_rounds=64, return_error=True)
+    assert adapted.mean() < errors.mean()
+    with pytest.raises(ValueError, match="error must be >= 0"):
+        fz.bake_irradiance(grid(), roof(), [light], error=-1.0)
+
+
+def test_linked_lights_reach_only_their_objects():
+    light = fz.Light(fz.DomeLight(), path="/dome", lit=fz.ObjectSet([3]))
+    assert fz.bake_irradiance(grid(), fz.RayScene([]), [light], objects=[3]).any()
+    assert not fz.bake_irradiance(grid(), fz.RayScene([]), [light], objects=[2]).any()

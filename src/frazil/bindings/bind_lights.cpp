@@ -54,8 +54,8 @@ void bind_lights(nb::module_& module) {
             },
             "image"_a = nb::none(), "path"_a = "DomeLight")
         .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
-        .def_prop_ro("image", [](nb::handle self) { return image_of<DomeLight>(self); },
-                     "(height, width, 3) float32, or None.")
+        .def_prop_ro(
+            "image", [](nb::handle self) { return image_of<DomeLight>(self); }, "(height, width, 3) float32, or None.")
         .def(
             "radiance",
             [](const DomeLight& light, const Triple& direction) {
@@ -81,8 +81,8 @@ void bind_lights(nb::module_& module) {
             },
             "width"_a = 1.0f, "height"_a = 1.0f, "image"_a = nb::none(), "path"_a = "RectLight")
         .def_prop_ro("has_image", [](const RectLight& light) { return light.image != nullptr; })
-        .def_prop_ro("image", [](nb::handle self) { return image_of<RectLight>(self); },
-                     "(height, width, 3) float32, or None.")
+        .def_prop_ro(
+            "image", [](nb::handle self) { return image_of<RectLight>(self); }, "(height, width, 3) float32, or None.")
         .def_rw("width", &RectLight::width)
         .def_rw("height", &RectLight::height);
     nb::class_<DiskLight>(module, "DiskLight", "A disk in x and y that shines along -z, in the light's units.")
@@ -128,7 +128,8 @@ void bind_lights(nb::module_& module) {
                      [](const MeshLight& light) {
                          return light.object == kNoObject ? std::optional<std::uint32_t>() : light.object;
                      })
-        .def_prop_ro("mesh", [](const MeshLight& light) { return *light.mesh; }, "A copy of the mesh.")
+        .def_prop_ro(
+            "mesh", [](const MeshLight& light) { return *light.mesh; }, "A copy of the mesh.")
         .def_prop_ro(
             "triangle_factors",
             [](nb::handle self) -> nb::object {

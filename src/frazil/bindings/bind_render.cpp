@@ -181,6 +181,8 @@ void bind_options(nb::module_& module) {
         .def_rw("spacing", &RenderOptions::spacing)
         .def_rw("spacing_scale", &RenderOptions::spacing_scale)
         .def_rw("bake_samples", &RenderOptions::bake_samples)
+        .def_rw("bake_error", &RenderOptions::bake_error)
+        .def_rw("translucent_shadows", &RenderOptions::translucent_shadows)
         .def_rw("bake_bounces", &RenderOptions::bake_bounces)
         .def_rw("aovs", &RenderOptions::aovs)
         .def_prop_rw(

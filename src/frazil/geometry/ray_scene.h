@@ -41,7 +41,7 @@ struct Placement {
 
 // What a placement does to light that goes straight through it.
 struct Passage {
-    bool is_open = false;         // false: it stops all light
+    float share = 0.0f;           // of the light that enters; 0: it stops all light
     float eta = 1.0f;             // of its inside, relative to the outside
     Rgb attenuation = Rgb(0.0f);  // 1/m, inside
 };

@@ -14,6 +14,12 @@ float weight_of(const Rgb& c) {
 
 // A search begins in one of so many equal intervals of u, whose first bin is known.
 constexpr int kGuides = 256;
+// So many lookups wait for memory together.
+constexpr std::size_t kBatch = 32;
+
+void prefetch(const void* address) {
+    __builtin_prefetch(address);
+}
 
 // The last bin of cdf[first .. last] whose lower edge is <= u, without branches to mispredict.
 int find_bin(const float* cdf, int first, int last, float u) {
@@ -161,11 +167,29 @@ Rgb Environment::eval(const V3f& direction) const {
     return radiance_in(cell_of(direction));
 }
 
-Rgb Environment::eval(const V3f& direction, float& pdf) const {
-    const Cell cell = cell_of(direction);
+Rgb Environment::eval_in(const Cell& cell, const V3f& direction, float& pdf) const {
     const float top = row_cosine_[std::size_t(cell.row)], bottom = row_cosine_[std::size_t(cell.row) + 1];
     pdf = pdf_in(cell, std::clamp((top - direction.y) / (top - bottom), 0.0f, 1.0f));
     return radiance_in(cell);
+}
+
+Rgb Environment::eval(const V3f& direction, float& pdf) const {
+    return eval_in(cell_of(direction), direction, pdf);
+}
+
+void Environment::eval_many(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const {
+    Cell cells[kBatch];
+    for (std::size_t begin = 0; begin < directions.size(); begin += kBatch) {
+        const std::size_t count = std::min(kBatch, directions.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) {
+            cells[i] = cell_of(directions[begin + i]);
+            prefetch(cells[i].corner[0]);
+            prefetch(cells[i].corner[2]);
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            radiances[begin + i] = eval_in(cells[i], directions[begin + i], pdfs[begin + i]);
+        }
+    }
 }
 
 float Environment::pdf(const V3f& direction) const {
@@ -174,13 +198,22 @@ float Environment::pdf(const V3f& direction) const {
     return pdf;
 }
 
-V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
-    Cell cell;
-    const auto guide_of = [&](int row) { return &guides_[std::size_t(row) * (kGuides + 1)]; };
-    cell.row = find_bin(marginal_cdf_.data(), guide_of(height_ + 1), u.y);
+const std::uint32_t* Environment::guide_of(int row) const {
+    return &guides_[std::size_t(row) * (kGuides + 1)];
+}
+
+int Environment::sample_row(float u) const {
+    return find_bin(marginal_cdf_.data(), guide_of(height_ + 1), u);
+}
+
+void Environment::sample_column(float u, Cell& cell) const {
     const float* cdf = &conditional_cdf_[std::size_t(cell.row) * (std::size_t(width_) + 1)];
-    cell.column = find_bin(cdf, guide_of(cell.row), u.x);
+    cell.column = find_bin(cdf, guide_of(cell.row), u);
     set_corners(cell);
+}
+
+V3f Environment::sample_in(Cell& cell, const V2f& u, float& pdf, Rgb& radiance) const {
+    const float* cdf = &conditional_cdf_[std::size_t(cell.row) * (std::size_t(width_) + 1)];
     // What is left of u within its bin becomes the place within the cell, by the slope between its corners.
     const auto rest = [](const float* bins, int bin, float value) {
         return std::clamp((value - bins[bin]) / (bins[bin + 1] - bins[bin]), 0.0f, 1.0f);
@@ -201,6 +234,33 @@ V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
     radiance = radiance_in(cell);
     pdf = pdf_in(cell, down);
     return {sine * turn.y, cosine, -sine * turn.x};
+}
+
+V3f Environment::sample(const V2f& u, float& pdf, Rgb& radiance) const {
+    Cell cell;
+    cell.row = sample_row(u.y);
+    sample_column(u.x, cell);
+    return sample_in(cell, u, pdf, radiance);
+}
+
+void Environment::sample_many(std::span<const V2f> u, std::span<V3f> directions, std::span<float> pdfs,
+                              std::span<Rgb> radiances) const {
+    Cell cells[kBatch];
+    for (std::size_t begin = 0; begin < u.size(); begin += kBatch) {
+        const std::size_t count = std::min(kBatch, u.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) {
+            cells[i].row = sample_row(u[begin + i].y);
+            prefetch(guide_of(cells[i].row) + int(u[begin + i].x * kGuides));
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            sample_column(u[begin + i].x, cells[i]);
+            prefetch(cells[i].corner[0]);
+            prefetch(cells[i].corner[2]);
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            directions[begin + i] = sample_in(cells[i], u[begin + i], pdfs[begin + i], radiances[begin + i]);
+        }
+    }
 }
 
 }  // namespace frazil

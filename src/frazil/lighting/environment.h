@@ -9,6 +9,7 @@
 // Not: mip-maps.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,10 @@ class Environment {
     float pdf(const V3f& direction) const;
     // Both at once, for the price of one.
     Rgb eval(const V3f& direction, float& pdf) const;
+    // Many of either at once: memory is asked for ahead of its use, which is what large images wait for. The same bits.
+    void eval_many(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
+    void sample_many(std::span<const V2f> u, std::span<V3f> directions, std::span<float> pdfs,
+                     std::span<Rgb> radiances) const;
     int width() const { return width_; }
     int height() const { return height_; }
     const std::vector<Rgb>& pixels() const { return pixels_; }
@@ -47,6 +52,12 @@ class Environment {
         const Rgb* corner[4];  // upper left, upper right, lower left, lower right
     };
     Cell cell_of(const V3f& direction) const;
+    Rgb eval_in(const Cell& cell, const V3f& direction, float& pdf) const;
+    const std::uint32_t* guide_of(int row) const;
+    // The steps of sample(): the row, the column, and the place in the cell with what is found there.
+    int sample_row(float u) const;
+    void sample_column(float u, Cell& cell) const;
+    V3f sample_in(Cell& cell, const V2f& u, float& pdf, Rgb& radiance) const;
     void set_corners(Cell& cell) const;
     static Rgb radiance_in(const Cell& cell);
     // `down_cosine` is the place in the cell linear in the cosine.

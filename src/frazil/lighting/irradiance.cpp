@@ -62,6 +62,9 @@ struct Workspace {
     std::vector<int> lights;               // of each ray, in a crowd
     std::vector<Rgb> factors;              // what is left of it
     std::vector<float> arriving;           // luminance by sample
+    std::vector<V3f> directions;           // of a dome's lookups, and what they give
+    std::vector<float> pdfs;
+    std::vector<Rgb> radiances;
     LightPicker::Weights weights;
     std::size_t count = 0;  // samples that the rays stand for
     std::uint64_t traced = 0, dropped = 0;
@@ -162,14 +165,17 @@ class RayMaker {
         second_half_.draw(seed + 0x9e3779b9U, point, u.subspan(half));
         sample_cosine(normal, u.first(half), samples.first(half));
         dome.sample(points_.positions[point], u.subspan(half), samples.subspan(half));
+        work.directions.resize(half);
+        work.pdfs.resize(half);
+        work.radiances.resize(half);
+        for (std::size_t i = 0; i < half; ++i) work.directions[i] = samples[i].direction;
+        dome.dome_radiances(work.directions, work.pdfs, work.radiances);
         const float share = float(half) / float(n);
         for (std::size_t i = 0; i < n; ++i) {
             LightSample& sample = samples[i];
-            const float cosine = sample.direction.dot(normal);
-            if (cosine <= 0.0f) continue;
-            float image_pdf = sample.pdf;
-            if (i < half) sample.radiance = dome.dome_radiance(sample.direction, image_pdf);
-            sample.pdf = share * cosine * kInvPi + (1.0f - share) * image_pdf;
+            const float cosine = std::max(0.0f, sample.direction.dot(normal));
+            if (i < half) sample.radiance = work.radiances[i];
+            sample.pdf = share * cosine * kInvPi + (1.0f - share) * (i < half ? work.pdfs[i] : sample.pdf);
         }
     }
 

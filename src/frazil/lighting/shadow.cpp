@@ -1,14 +1,14 @@
 #include "frazil/lighting/shadow.h"
 
 #include <algorithm>
-#include <map>
 
 #include "frazil/translucency/fresnel.h"
 
 namespace frazil {
 namespace {
 
-constexpr float kNoLight = 1e-4f;  // below it light counts as stopped
+constexpr float kNoLight = 1e-4f, kNoLightDepth = 9.2f;  // below it, or deeper than -log of it, light counts as stopped
+constexpr float kFarAway = 1e18f;
 
 // How much of a shadow is there, by the distance of what casts it.
 float shadow_strength(const ShadowRules& rules, float distance) {
@@ -33,32 +33,48 @@ void plain_factors(const RayScene& scene, std::span<const Ray> rays, std::span<R
 
 Rgb transmittance(const RayScene& scene, const Ray& ray, PlacementMask mask) {
     const std::vector<Passage>& passages = scene.passages();
+    const float end = std::min(ray.t_max, kFarAway);
     Rgb passing(1.0f);
-    // Length inside each body: exits minus entries; and how many entries have no exit yet.
-    struct Inside {
-        float length = 0.0f;
-        int depth = 0;
-    };
-    std::map<std::uint32_t, Inside> bodies;
+    // How often each body was entered without being left; what all of them take from the light by the metre.
+    std::vector<std::pair<std::uint32_t, int>> entered;
+    Rgb attenuation(0.0f);
+    float t = ray.t_min;
     Ray left = ray;
     Hit hit;
-    while (scene.intersect(left, hit, mask)) {
-        if (hit.placement >= passages.size() || !passages[hit.placement].is_open) return Rgb(0.0f);
+    while (true) {
+        // Where nothing would be left of the light there is nothing to find.
+        const float least = std::min(attenuation.x, std::min(attenuation.y, attenuation.z));
+        left.t_max = least > 0.0f ? std::min(ray.t_max, t + kNoLightDepth / least) : ray.t_max;
+        if (!scene.intersect(left, hit, mask)) {
+            return left.t_max < ray.t_max ? Rgb(0.0f) : passing * exp(attenuation * (t - end));
+        }
+        if (hit.placement >= passages.size() || passages[hit.placement].share == 0.0f) return Rgb(0.0f);
+        const Passage& passage = passages[hit.placement];
+        passing *= exp(attenuation * (t - hit.t));
+        t = hit.t;
         // A slab reflects as much where light leaves it as where it entered, at the angle outside.
         const float facing = -hit.geometric_normal.dot(ray.direction);
-        passing *= 1.0f - fresnel_dielectric(std::min(1.0f, std::abs(facing)), passages[hit.placement].eta);
+        passing *= 1.0f - fresnel_dielectric(std::min(1.0f, std::abs(facing)), passage.eta);
+        const auto known = std::find_if(entered.begin(), entered.end(),
+                                        [&](const auto& entry) { return entry.first == hit.placement; });
+        if (facing > 0.0f) {
+            passing *= passage.share;
+            attenuation += passage.attenuation;
+            if (known == entered.end()) {
+                entered.emplace_back(hit.placement, 1);
+            } else {
+                ++known->second;
+            }
+        } else if (known != entered.end() && known->second > 0) {
+            attenuation -= passage.attenuation;
+            --known->second;
+        } else {
+            // The ray began inside.
+            passing *= exp(passage.attenuation * (ray.t_min - hit.t));
+        }
         if (max_component(passing) < kNoLight) return Rgb(0.0f);
-        Inside& inside = bodies[hit.placement];
-        inside.length += facing < 0.0f ? hit.t : -hit.t;
-        inside.depth += facing < 0.0f ? -1 : 1;
         left.t_min = std::nextafter(hit.t * (1.0f + 1e-6f), std::numeric_limits<float>::infinity());
     }
-    for (const auto& [placement, inside] : bodies) {
-        // A ray to a light inside the body ends there.
-        const float beyond = inside.depth > 0 && std::isfinite(ray.t_max) ? float(inside.depth) * ray.t_max : 0.0f;
-        passing *= exp(passages[placement].attenuation * -std::max(0.0f, inside.length + beyond));
-    }
-    return passing;
 }
 
 Rgb shadow_factor(const RayScene& scene, const LightSampler& lights, int light, const Ray& ray) {

@@ -198,11 +198,20 @@ Rgb WorldLight::dome_radiance(const V3f& direction) const {
     return radiance_ * dome.image->eval({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)});
 }
 
-Rgb WorldLight::dome_radiance(const V3f& direction, float& pdf) const {
+void WorldLight::dome_radiances(std::span<const V3f> directions, std::span<float> pdfs,
+                                std::span<Rgb> radiances) const {
     const Dome& dome = std::get<Dome>(shape_);
-    pdf = 0.25f * kInvPi;
-    if (!dome.image) return radiance_;
-    return radiance_ * dome.image->eval({direction.dot(dome.x), direction.dot(dome.y), direction.dot(dome.z)}, pdf);
+    constexpr std::size_t kBatch = 64;
+    V3f local[kBatch];
+    for (std::size_t begin = 0; begin < directions.size(); begin += kBatch) {
+        const std::size_t count = std::min(kBatch, directions.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) {
+            const V3f& d = directions[begin + i];
+            local[i] = {d.dot(dome.x), d.dot(dome.y), d.dot(dome.z)};
+        }
+        dome.image->eval_many({local, count}, pdfs.subspan(begin, count), radiances.subspan(begin, count));
+        for (std::size_t i = begin; i < begin + count; ++i) radiances[i] *= radiance_;
+    }
 }
 
 float WorldLight::importance(const V3f& position) const {

@@ -60,9 +60,10 @@ class WorldLight {
     bool is_dome() const { return std::holds_alternative<Dome>(shape_); }
     // A uniform dome: cosine-weighted directions serve it best.
     bool is_uniform_dome() const;
-    // Radiance of a dome in a direction, and the density with which sample() chooses it; only where is_dome().
+    // Radiance of a dome in a direction; only where is_dome().
     Rgb dome_radiance(const V3f& direction) const;
-    Rgb dome_radiance(const V3f& direction, float& pdf) const;
+    // The same for many, with the densities of sample(); only for a dome with an image.
+    void dome_radiances(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
 
   private:
     struct Dome {

@@ -47,22 +47,37 @@ bool enter_unit_ball(const V3f& o, const V3f& d, float& t) {
 // ---- dome ----
 
 void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> u, std::span<LightSample> out) const {
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        if (!dome.image) {
-            sample.direction = uniform_sphere(u[i]);
-            sample.radiance = radiance_;
-            sample.pdf = 0.25f * kInvPi;
-            continue;
+    if (!dome.image) {
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            out[i].direction = uniform_sphere(u[i]);
+            out[i].radiance = radiance_;
+            out[i].pdf = 0.25f * kInvPi;
         }
-        const V3f local = dome.image->sample(u[i], sample.pdf, sample.radiance);
-        sample.direction = dome.x * local.x + dome.y * local.y + dome.z * local.z;
-        sample.radiance *= radiance_;
+        return;
+    }
+    constexpr std::size_t kBatch = 64;
+    V3f local[kBatch];
+    Rgb radiances[kBatch];
+    float pdfs[kBatch];
+    for (std::size_t begin = 0; begin < u.size(); begin += kBatch) {
+        const std::size_t count = std::min(kBatch, u.size() - begin);
+        dome.image->sample_many(u.subspan(begin, count), {local, count}, {pdfs, count}, {radiances, count});
+        for (std::size_t i = 0; i < count; ++i) {
+            LightSample& sample = out[begin + i];
+            sample.direction = dome.x * local[i].x + dome.y * local[i].y + dome.z * local[i].z;
+            sample.radiance = radiances[i] * radiance_;
+            sample.pdf = pdfs[i];
+        }
     }
 }
 
-bool WorldLight::hit_by(const Dome&, const V3f&, const V3f& direction, LightHit& hit) const {
-    hit.radiance = dome_radiance(direction, hit.pdf);
+bool WorldLight::hit_by(const Dome& dome, const V3f&, const V3f& direction, LightHit& hit) const {
+    hit.pdf = 0.25f * kInvPi;
+    if (dome.image) {
+        dome_radiances({&direction, 1}, {&hit.pdf, 1}, {&hit.radiance, 1});
+    } else {
+        hit.radiance = radiance_;
+    }
     hit.distance = kInfinity;
     return true;
 }

@@ -106,6 +106,7 @@ std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ra
         const IceMaterial& material = *bodies[i]->material;
         IrradianceOptions bake_options{options.bake_samples, options.seed};
         bake_options.objects = {static_cast<std::uint32_t>(i)};
+        bake_options.error = options.bake_error;
         Irradiance irradiance = bake_irradiance(
             lit[i].points, ray_scene, lights,
             [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,

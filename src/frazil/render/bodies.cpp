@@ -116,4 +116,14 @@ void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const Ra
     }
 }
 
+std::vector<Passage> passages_of(const Scene& scene) {
+    std::vector<Passage> passages(scene.objects.size());
+    for (std::size_t i = 0; i < passages.size(); ++i) {
+        const auto* ice = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
+        if (!ice || ice->refraction == 0.0f) continue;
+        passages[i] = {ice->refraction, ice->medium.eta, ice->medium.sigma_s_prime + ice->medium.sigma_a};
+    }
+    return passages;
+}
+
 }  // namespace frazil

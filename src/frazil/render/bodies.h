@@ -57,6 +57,9 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
                                  const GatherOptions& options);
 // Scale the exitance that was gathered as the body's material asks for; `gains` as above.
 void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
+// What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
+// absorbs; others nothing.
+std::vector<Passage> passages_of(const Scene& scene);
 
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);

@@ -24,7 +24,11 @@ struct RenderOptions {
     float spacing = 0.0f;        // of all points, metres; 0 = by material
     float spacing_scale = 1.0f;  // multiplies every spacing
     int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
-    int bake_bounces = 4;        // of light that reaches the points by way of ice and diffuse surfaces
+    float bake_error = 0.0f;     // relative error at each point to which the bake takes more samples; 0 = none
+    // Shadow rays of the bake go on through ice, dimmed. Off: light that enters ice is counted as diffused there, and what
+    // also went straight on would be counted twice; on for thin clear ice, whose light that is.
+    bool translucent_shadows = false;
+    int bake_bounces = 4;  // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
     std::vector<std::string> aovs;  // of the table, beside those that are made anyway
 };

@@ -28,12 +28,14 @@ std::vector<std::size_t> groups_of(const std::vector<Light>& lights, const std::
     return result;
 }
 
-RayScene make_ray_scene(const Scene& scene, RenderStats& stats) {
+RayScene make_ray_scene(const Scene& scene, const RenderOptions& options, RenderStats& stats) {
     Stopwatch watch(stats.seconds["scene"]);
     std::vector<Placement> placements;
     placements.reserve(scene.objects.size());
     for (const Object& object : scene.objects) placements.push_back({object.mesh, object.local_to_world});
-    return RayScene(scene.meshes, placements);
+    RayScene ray_scene(scene.meshes, placements);
+    if (options.translucent_shadows) ray_scene.set_passages(passages_of(scene));
+    return ray_scene;
 }
 
 // The picture in the making: its sums, and which tiles and pixels the running pass still has to serve.
@@ -202,7 +204,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
                              const Checkpoints* checkpoints) {
     RenderStats stats;
     FilmLayout layout = make_layout(scene, options.aovs);
-    const RayScene ray_scene = make_ray_scene(scene, stats);
+    const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     const std::vector<std::string> groups = light_groups(scene.lights);
@@ -263,7 +265,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
 
 BakeResult bake_in_arena(const Scene& scene, const RenderOptions& options, Bake known, Progress* progress) {
     RenderStats stats;
-    const RayScene ray_scene = make_ray_scene(scene, stats);
+    const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     Bake result = make_bake(scene, ray_scene, bodies, options, std::move(known), stats, progress);
     for (const LitPoints& lit : result.bodies) stats.points += lit.points.size();

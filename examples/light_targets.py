@@ -1,0 +1,71 @@
+"""One light, told to act on one component at a time: python examples/light_targets.py [OUT.png].
+
+A spire on a floor under a dim sky. From left to right the rim light acts on everything, translucency, specular,
+diffuse.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+import frazil as fz
+from frazil.image import write_png
+
+ALL = {"translucency": 1.0, "specular": 1.0, "diffuse": 1.0, "refraction": 1.0}
+
+
+def spire(sides: int = 7, rings: int = 60) -> fz.Mesh:
+    t, phi = np.linspace(0, 1, rings)[:, None], np.linspace(0, 2 * np.pi, sides, endpoint=False)[None]
+    radius = 0.22 * (1 - t) ** 0.8 + 1e-3
+    x, z = radius * np.cos(phi + 0.7 * t) + 0.08 * t**2, radius * np.sin(phi + 0.7 * t)
+    ring = np.stack([x, np.broadcast_to(t, x.shape), z], -1).reshape(-1, 3)
+    positions = np.concatenate([ring, [[0, 0, 0], [0.08, 1.02, 0]]])
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(rings - 1), np.arange(sides), indexing="ij"))
+    a, b = i * sides + j, i * sides + (j + 1) % sides
+    faces = [np.stack([a, a + sides, b], 1), np.stack([b, a + sides, b + sides], 1)]
+    k = np.arange(sides)
+    top = (rings - 1) * sides
+    faces += [np.stack([k, (k + 1) % sides, np.full(sides, len(ring))], 1)]
+    faces += [np.stack([top + (k + 1) % sides, top + k, np.full(sides, len(ring) + 1)], 1)]
+    return fz.Mesh(positions.astype(np.float32), np.concatenate(faces).astype(np.int32))
+
+
+def look_at(eye, target) -> np.ndarray:
+    z = np.subtract(eye, target) / np.linalg.norm(np.subtract(eye, target))
+    x = np.cross([0, 1, 0], z) / np.linalg.norm(np.cross([0, 1, 0], z))
+    matrix = np.eye(4)
+    matrix[:4, :3] = [x, np.cross(z, x), z, eye]
+    return matrix
+
+
+def scene_with(multipliers: dict[str, float]) -> fz.Scene:
+    scene = fz.Scene()
+    medium = fz.Medium(sigma_s_prime=(25.0, 25.0, 25.0), sigma_a=(4.0, 0.8, 0.3), eta=1.31)
+    ice = scene.add_material("/ice", fz.IceMaterial(medium, refraction=0.0))
+    grey = scene.add_material("/grey", fz.StandardMaterial())
+    scene.add_object("/spire", scene.add_mesh(spire(), "/spire"), ice)
+    corners = np.float32([[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]])
+    floor = scene.add_mesh(fz.Mesh(corners, np.int32([[0, 1, 2], [0, 2, 3]])), "/floor")
+    scene.add_object("/floor", floor, grey)
+    scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.06, 0.08, 0.1], path="/sky"))
+    rim = look_at((1.2, 1.3, -0.9), (0, 0.4, 0))
+    off = dict.fromkeys(ALL, 0.0)
+    scene.add_light(
+        fz.Light(fz.RectLight(0.6, 0.6), matrix=rim, radiance=[50.0, 46.0, 42.0], path="/rim", **(off | multipliers))
+    )
+    scene.camera = fz.Camera(matrix=look_at((0.3, 0.75, 2.6), (0.05, 0.47, 0)), focal_length=35.0)
+    return scene
+
+
+def main(path: str = "light_targets.png") -> None:
+    pictures = []
+    for chosen in (ALL, *({name: 1.0} for name in ("translucency", "specular", "diffuse"))):
+        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=32)
+        pictures.append(film["beauty"][:, :, :3])
+    write_png(path, np.concatenate(pictures, axis=1))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])
