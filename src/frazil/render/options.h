@@ -26,7 +26,8 @@ struct RenderOptions {
     int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
     int bake_bounces = 1;        // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
-    std::vector<std::string> aovs;  // of the table, beside those that are made anyway
+    std::vector<std::pair<std::string, std::string>> lpes;  // light path expressions: a layer's name, and what it keeps
+    std::vector<std::string> aovs;                          // of the table, beside those that are made anyway
 };
 
 struct RenderStats {
