@@ -193,7 +193,7 @@ def render(
         start = time.perf_counter()
         denoise_film(film)
         stats["seconds"]["denoise"] = time.perf_counter() - start
-    stats["peak_memory"] = peak_memory()
+    film.stats["peak_memory"] = peak_memory()
     return film
 
 

@@ -84,19 +84,16 @@ def test_kill_in_a_loop_loses_no_more_than_the_last_interval(tmp_path):
     path, exr = tmp_path / "a.checkpoint", tmp_path / "a.exr"
     here = os.path.dirname(__file__)
     code = textwrap.dedent(WORKER.format(here=here, path=str(path), exr=str(exr), options=options))
-    kills = 0
-    for _ in range(60):
+    for kill in range(5):
         worker = subprocess.Popen([sys.executable, "-c", code])
-        try:
-            worker.wait(timeout=1.5 if not path.exists() else 1.0 + 0.2 * kills)
-        except subprocess.TimeoutExpired:
-            worker.send_signal(signal.SIGKILL)
-            worker.wait()
-            kills += 1
+        before = path.stat().st_mtime_ns if path.exists() else 0
+        while worker.poll() is None and (not path.exists() or path.stat().st_mtime_ns == before):
             time.sleep(0.01)
-        if exr.exists():
-            break
-    assert kills > 0, "the render was never killed: give it more samples"
+        time.sleep(0.05 * kill)  # at another moment of the interval each time
+        worker.send_signal(signal.SIGKILL)
+        worker.wait()
+        assert not exr.exists(), "the render was over before it was killed: give it more samples"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=300)
     whole = fz.render(ice_over_floor(), **options)
     resumed = fz.Film.load(exr)
     np.testing.assert_array_equal(resumed["Z"], whole["Z"])
