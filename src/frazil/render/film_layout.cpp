@@ -85,8 +85,8 @@ void add_lpes(const Scene& scene, std::span<const NamedLpe> lpes, FilmLayout& la
         if (!is_plain) throw ValueError(str("lpe: name must be of letters, digits and _, got '", name, "'."));
         for (const Aov& aov : aov_table()) {
             if (name == aov.name || name.rfind(str(aov.name, "_"), 0) == 0) {
-                throw ValueError(
-                    str("lpe ", name, ": name must not be, or begin like, that of the AOV ", aov.name, ". Choose another."));
+                throw ValueError(str("lpe ", name, ": name must not be, or begin like, that of the AOV ", aov.name,
+                                     ". Choose another."));
             }
         }
         if (std::find(layout.lpe_names.begin(), layout.lpe_names.end(), name) != layout.lpe_names.end()) {

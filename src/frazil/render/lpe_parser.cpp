@@ -136,7 +136,8 @@ class Parser {
     LpeSymbol event() {
         LpeSymbol symbol;
         letters(kTypes, "type", symbol.types_negated, symbol.types);
-        if (peek() != '>' && !is_at_end()) letters(kScatterings, "scattering", symbol.scatterings_negated, symbol.scatterings);
+        if (peek() != '>' && !is_at_end())
+            letters(kScatterings, "scattering", symbol.scatterings_negated, symbol.scatterings);
         if (peek() != '>' && !is_at_end()) symbol.first = labels();
         if (peek() != '>' && !is_at_end()) symbol.second = labels();
         if (!take('>'))

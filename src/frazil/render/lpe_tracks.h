@@ -16,7 +16,7 @@ struct LpeTracks {
     // Lobes in the order diffuse, specular, refraction.
     struct Track {
         std::uint32_t lpe = 0;
-        LpeAutomaton::State state = 0;
+        LpeAutomaton::State state = 0, previous = 0;  // previous: before the last vertex
         std::array<Rgb, 3> lobes;
 
         Rgb sum() const { return lobes[0] + lobes[1] + lobes[2]; }
@@ -30,7 +30,7 @@ struct LpeTracks {
         automata = &wanted;
         for (std::uint32_t i = 0; i < wanted.size(); ++i) {
             const auto state = wanted[i].camera(wanted[i].start());
-            if (state != LpeAutomaton::kDead) tracks.push_back({i, state, {Rgb(0.0f), Rgb(0.0f), Rgb(1.0f)}});
+            if (state != LpeAutomaton::kDead) tracks.push_back({i, state, state, {Rgb(0.0f), Rgb(0.0f), Rgb(1.0f)}});
         }
     }
 
@@ -43,7 +43,8 @@ struct LpeTracks {
             for (int lobe = 0; lobe < 3; ++lobe) {
                 if (values[lobe] == Rgb(0.0f)) continue;
                 const auto state = (*automata)[track.lpe].next(track.state, kinds[lobe], object);
-                if (state != LpeAutomaton::kDead) at(track.lpe, state).lobes[lobe] += track.sum() * values[lobe];
+                if (state != LpeAutomaton::kDead || track.state != LpeAutomaton::kDead)
+                    at(track.lpe, state, track.state).lobes[lobe] += track.sum() * values[lobe];
             }
         }
     }
@@ -55,11 +56,11 @@ struct LpeTracks {
     }
 
   private:
-    Track& at(std::uint32_t lpe, LpeAutomaton::State state) {
+    Track& at(std::uint32_t lpe, LpeAutomaton::State state, LpeAutomaton::State previous) {
         for (Track& track : tracks) {
-            if (track.lpe == lpe && track.state == state) return track;
+            if (track.lpe == lpe && track.state == state && track.previous == previous) return track;
         }
-        tracks.push_back({lpe, state, {Rgb(0.0f), Rgb(0.0f), Rgb(0.0f)}});
+        tracks.push_back({lpe, state, previous, {Rgb(0.0f), Rgb(0.0f), Rgb(0.0f)}});
         return tracks.back();
     }
 };

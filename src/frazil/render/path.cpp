@@ -53,6 +53,7 @@ struct PathTracer::Core {
     V3f position = V3f(0.0f);
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
     bool is_primary = false;                // seen by the camera itself
+    bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there
     // Light that enters right here, for the compensation that fills up; its light group.
     Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;
@@ -491,6 +492,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     }
     path.inside = crossing.beyond;
     path.core = core;
+    path.core.is_entered = true;
     path.clear = ice.refraction;
     path.volume = ice.volume;
     path.leave_from(surface.position, -surface.geometric_normal,
@@ -631,7 +633,8 @@ void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& s
     (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
     if (weights.sum() == Rgb(0.0f) && !core.is_primary) return;
     for (const LpeTracks::Track& track : path.lpe.tracks) {
-        const auto state = layout_.lpes[track.lpe].next(track.state, LpeKind::translucency, request.object);
+        const auto seen_from = core.is_entered ? track.previous : track.state;
+        const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
         if (state == LpeAutomaton::kDead) continue;
         request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share});
     }
