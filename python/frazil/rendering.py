@@ -12,7 +12,7 @@ import resource
 import sys
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -52,6 +52,7 @@ def render(
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
     aovs: Sequence[str] = (),
+    lpes: Mapping[str, str] | None = None,
     bake: Bake | None = None,
     bake_cache: str | os.PathLike | None = None,
     denoise: bool = False,
@@ -97,6 +98,8 @@ def render(
         ``blackman_harris`` or ``box``.
     aovs : sequence of str
         Layers of the AOV table to make beside those that are made anyway; see docs/aovs.md.
+    lpes : mapping of str to str
+        Light path expressions: a layer's name and what it keeps, as in ``{"ice_of_rim": "C<TD>.*<L.'rim'>"}``.
     bake : Bake, optional
         Of this very scene (`frazil.bake`); without one the render bakes.
     bake_cache : path-like, optional
@@ -154,6 +157,7 @@ def render(
         "estimator": estimator,
         "filter": pixel_filter,
         "aovs": chosen_aovs(aovs),
+        "lpes": list((lpes or {}).items()),
     }
     _refuse_what_cannot_fit(*resolution)
     if resume and checkpoint is None:
@@ -179,7 +183,11 @@ def render(
     stats = _both(bake_stats, result.stats)
     for message in result.stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
-    metadata = _provenance(scene, options, stats) | _what_layers_hold(result) | scene_headers(scene, aovs)
+    metadata = (
+        _provenance(scene, options | {"lpes": dict(lpes or {})}, stats)
+        | _what_layers_hold(result)
+        | scene_headers(scene, aovs)
+    )
     film = Film(result.layers, metadata, stats)
     if denoise:
         start = time.perf_counter()

@@ -83,6 +83,10 @@ def render_command(
     multipart: Annotated[
         bool, typer.Option("--multipart", help="Write every layer as a part of its own, which programs read singly.")
     ] = False,
+    lpe: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=EXPRESSION", help="Write a layer of a light path expression, as in ice=C<TD>.*"),
+    ] = None,
     aov: Annotated[
         list[str] | None,
         typer.Option(
@@ -131,6 +135,7 @@ def render_command(
     within("--bake-samples", bake_samples, 1, 2**20)
     within("--bake-bounces", bake_bounces, 0, 64)
     layers = _chosen_layers(aov)
+    expressions = _expressions(lpe)
     jobs = _jobs(output, png, no_png, frame, frames)
     refuse_unreadable(scene)
     for _, exr, preview in jobs:
@@ -172,6 +177,7 @@ def render_command(
 
             chosen = layers or _authored_layers(loaded)
             options["aovs"] = chosen or ()
+            options["lpes"] = expressions | _authored_lpes(loaded)
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)
                 options |= {"checkpoint": saved, "resume": resume and saved.exists()}
@@ -179,7 +185,9 @@ def render_command(
             film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
 
             start = time.perf_counter()
-            film.save(exr, compression, layers=chosen and layers_of(chosen, film), multipart=multipart)
+            film.save(
+                exr, compression, layers=chosen and [*layers_of(chosen, film), *options["lpes"]], multipart=multipart
+            )
             if preview is not None:
                 film.save_preview(preview)
             if checkpoint is not None or resume:
@@ -209,6 +217,26 @@ def _chosen_layers(aov: list[str] | None) -> list[str] | None:
         if names.count(name) > 1:
             raise misused("--aov", f"must name each layer once, got '{name}' twice.")
     return list(dict.fromkeys(["beauty", *_without_all(names)]))
+
+
+def _expressions(lpe: list[str] | None) -> dict[str, str]:
+    """The expressions of `--lpe` by layer."""
+    expressions: dict[str, str] = {}
+    for text in lpe or []:
+        name, separator, expression = text.partition("=")
+        if not (name and separator and expression):
+            raise misused("--lpe", f"must be NAME=EXPRESSION, got '{text}'.")
+        if name in expressions:
+            raise misused("--lpe", f"must name each layer once, got '{name}' twice.")
+        expressions[name] = expression
+    return expressions
+
+
+def _authored_lpes(loaded: Any) -> dict[str, str]:
+    """The light path expressions that the stage's render vars ask for, by layer."""
+    settings = loaded.render_settings
+    product_vars = settings.product.vars if settings else []
+    return {var.layer: var.source_name for var in product_vars if var.source_type == "lpe"}
 
 
 def _without_all(names: list[str]) -> list[str]:
@@ -280,6 +308,8 @@ def _authored_layers(loaded: Any) -> list[str] | None:
     known = {row["name"] for row in aov_table()}
     layers = ["beauty"]
     for var in settings.product.vars:
+        if var.source_type == "lpe":
+            continue
         name = _LAYER_OF_VAR.get(var.source_name, var.source_name)
         if name in known:
             layers.append(name)

@@ -16,6 +16,12 @@ class RenderVar:
     path: str
     source_name: str
     data_type: str
+    source_type: str = "raw"
+
+    @property
+    def layer(self) -> str:
+        """What the layer of a light path expression is called: the last name of the prim's path."""
+        return self.path.rpartition("/")[2]
 
 
 @dataclass
@@ -112,8 +118,11 @@ def _read_product(context: ReadContext, product: UsdRender.Product, resolution, 
         if not var:
             context.warn(product.GetPath(), f"names the render var <{target}>, which does not exist.")
             continue
+        source = str(context.get(var.GetSourceTypeAttr(), "raw"))
         name = str(context.get(var.GetSourceNameAttr(), "") or var.GetPrim().GetName())
-        result.vars.append(RenderVar(str(var.GetPath()), name, str(context.get(var.GetDataTypeAttr(), "color3f"))))
+        result.vars.append(
+            RenderVar(str(var.GetPath()), name, str(context.get(var.GetDataTypeAttr(), "color3f")), source)
+        )
     return result
 
 

@@ -1,4 +1,5 @@
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string_view.h>
 
 #include <atomic>
@@ -185,6 +186,7 @@ void bind_options(nb::module_& module) {
         .def_rw("translucent_shadows", &RenderOptions::translucent_shadows)
         .def_rw("bake_bounces", &RenderOptions::bake_bounces)
         .def_rw("aovs", &RenderOptions::aovs)
+        .def_rw("lpes", &RenderOptions::lpes)
         .def_prop_rw(
             "tolerance", [](const RenderOptions& self) { return self.gather.tolerance; },
             [](RenderOptions& self, float tolerance) { self.gather.tolerance = tolerance; })

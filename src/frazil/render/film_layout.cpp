@@ -71,6 +71,32 @@ bool is_taken(const std::string& group) {
            std::isdigit(static_cast<unsigned char>(group[ramp.size()]));
 }
 
+void add_lpes(const Scene& scene, std::span<const NamedLpe> lpes, FilmLayout& layout) {
+    if (lpes.empty()) return;
+    LpeAlphabet alphabet;
+    alphabet.groups = layout.groups;
+    for (const Object& object : scene.objects) alphabet.objects.push_back(object.path);
+    for (const Light& light : scene.lights) {
+        alphabet.lights.push_back({light.group, light.path, std::holds_alternative<DomeLight>(light.shape)});
+    }
+    for (const auto& [name, expression] : lpes) {
+        const bool is_plain = !name.empty() && std::all_of(name.begin(), name.end(),
+                                                           [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+        if (!is_plain) throw ValueError(str("lpe: name must be of letters, digits and _, got '", name, "'."));
+        for (const Aov& aov : aov_table()) {
+            if (name == aov.name || name.rfind(str(aov.name, "_"), 0) == 0) {
+                throw ValueError(str("lpe ", name, ": name must not be, or begin like, that of the AOV ", aov.name,
+                                     ". Choose another."));
+            }
+        }
+        if (std::find(layout.lpe_names.begin(), layout.lpe_names.end(), name) != layout.lpe_names.end()) {
+            throw ValueError(str("lpe ", name, ": names must differ from each other, got this one twice."));
+        }
+        layout.lpes.emplace_back("lpe " + name, expression, alphabet);
+        layout.lpe_names.push_back(name);
+    }
+}
+
 void add_ids(const Scene& scene, FilmLayout& layout) {
     std::vector<std::uint32_t> placed(scene.meshes.size(), 0);
     for (const Object& object : scene.objects) {
@@ -115,7 +141,7 @@ std::string FilmLayout::group_name(const std::string& layer, std::size_t group) 
     return str(layer, "_", groups[group].empty() ? "default" : groups[group]);
 }
 
-FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs) {
+FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes) {
     check_aovs(extra_aovs);
     FilmLayout layout;
     for (const Aov& aov : aov_table()) {
@@ -148,6 +174,7 @@ FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_ao
         is_known[object.material] = 1;
     }
     add_ids(scene, layout);
+    add_lpes(scene, lpes, layout);
     if (layout.has("translucency_ramp")) add_knots(scene, layout);
     for (const ModeName& named : kModes) {
         if (layout.has(named.aov)) layout.modes.push_back(named.mode);

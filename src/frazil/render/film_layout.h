@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frazil/render/film.h"
+#include "frazil/render/lpe.h"
 #include "frazil/render/scene.h"
 
 namespace frazil {
@@ -31,6 +32,10 @@ struct FilmLayout {
     // By object: 1 + its material, 1 + its number among those of its mesh, the spacing of its points (bodies fill it in).
     std::vector<float> material_id, instance_id, point_spacing;
 
+    // Light path expressions, each a layer of that name.
+    std::vector<std::string> lpe_names;
+    std::vector<LpeAutomaton> lpes;
+
     // Planes: knots first, then modes.
     std::vector<RampKnot> knots;
     std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers
@@ -48,7 +53,11 @@ struct FilmLayout {
     std::string group_name(const std::string& layer, std::size_t group) const;
 };
 
-// ValueError for AOVs that are unknown or twice there, and for light groups whose layers would be other layers.
-FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs);
+// A name and an expression.
+using NamedLpe = std::pair<std::string, std::string>;
+
+// ValueError for AOVs that are unknown or twice there, for light groups whose layers would be other layers, and for light
+// path expressions that are wrong or named like another layer.
+FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes);
 
 }  // namespace frazil

@@ -136,9 +136,10 @@ class Parser {
     LpeSymbol event() {
         LpeSymbol symbol;
         letters(kTypes, "type", symbol.types_negated, symbol.types);
-        if (peek() != '>') letters(kScatterings, "scattering", symbol.scatterings_negated, symbol.scatterings);
-        if (peek() != '>') symbol.first = labels();
-        if (peek() != '>') symbol.second = labels();
+        if (peek() != '>' && !is_at_end())
+            letters(kScatterings, "scattering", symbol.scatterings_negated, symbol.scatterings);
+        if (peek() != '>' && !is_at_end()) symbol.first = labels();
+        if (peek() != '>' && !is_at_end()) symbol.second = labels();
         if (!take('>'))
             fail(is_at_end() ? "'>' is missing"
                              : "an event has a type, a scattering and two labels at most; '>' is missing");

@@ -30,7 +30,8 @@ struct RenderOptions {
     bool translucent_shadows = false;
     int bake_bounces = 4;  // of light that reaches the points by way of ice and diffuse surfaces
     GatherOptions gather;
-    std::vector<std::string> aovs;  // of the table, beside those that are made anyway
+    std::vector<std::pair<std::string, std::string>> lpes;  // light path expressions: a layer's name, and what it keeps
+    std::vector<std::string> aovs;                          // of the table, beside those that are made anyway
 };
 
 struct RenderStats {

@@ -67,6 +67,7 @@ struct PathTracer::Core {
     V3f position = V3f(0.0f);
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
     bool is_primary = false;                // seen by the camera itself
+    bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there
     // Light that enters right here, for the compensation that fills up; its light group.
     Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;
@@ -104,6 +105,7 @@ struct PathTracer::Path {
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
     float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
+    LpeTracks lpe;                      // of the light path expressions that are asked for
 
     // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
     Scattering weights(float diffuse, float specular, float refraction) const {
@@ -113,7 +115,9 @@ struct PathTracer::Path {
     }
     Scattering weights() const { return weights(1.0f, 1.0f, 1.0f); }
 
-    void scatter(const Scattering& value_over_pdf) {
+    // `refracted` is what the lobe of refraction does at the object.
+    void scatter(const Scattering& value_over_pdf, std::size_t object, LpeKind refracted = LpeKind::refraction) {
+        lpe.scatter({value_over_pdf.diffuse, value_over_pdf.specular, value_over_pdf.refraction}, refracted, object);
         if (bounce > 0) {
             before = weights();
             last = value_over_pdf;
@@ -125,11 +129,16 @@ struct PathTracer::Path {
         ++bounce;
     }
 
+    void scale(const Rgb& factor) {
+        last.scale(factor);
+        lpe.scale(factor);
+    }
+
     // Go on with the given chance; false where the path ends.
     bool survives(float chance) {
         if (chance >= 1.0f) return true;
         if (!(sampler.next_1d() < chance)) return false;
-        last.scale(Rgb(1.0f / chance));
+        scale(Rgb(1.0f / chance));
         return true;
     }
 
@@ -207,6 +216,7 @@ void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler samp
     path.last.refraction = Rgb(1.0f);
     path.width = pixel_.radius;
     path.spread = pixel_.spread;
+    if (!layout_.lpes.empty()) path.lpe.begin(layout_.lpes);
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
@@ -297,6 +307,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         if (const Rgb emission = shader.emission(); is_own && emission != Rgb(0.0f)) {
             const std::size_t group = own_light < 0 ? layout_.emission_group : group_of_light_[std::size_t(own_light)];
             deliver(path, Component::emission, path.weights(), group, emission, tile);
+            for (const LpeTracks::Track& track : path.lpe.tracks) {
+                if (!layout_.lpes[track.lpe].ends_in_emission(track.state, surface.object)) continue;
+                tile.add_lpe(path.pixel, track.lpe, track.sum() * emission);
+            }
         }
         float reflection_odds = 1.0f;
         if (body) {
@@ -335,7 +349,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         Scattering value = shader.eval(wo, wi);
         if (!(value.pdf > 0.0f)) return;
         value.scale(Rgb(1.0f / (value.pdf * reflection_odds)));
-        path.scatter(value);
+        path.scatter(value, surface.object);
         path.receive(surface, surface.geometric_normal, LightUse::surface);
         ++path.scattered;
         path.is_delta = false;
@@ -392,6 +406,9 @@ void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& t
         const std::size_t group = group_of_light_[std::size_t(hit.light)];
         if (path.bounce == 0) {
             if (t_max < hit.distance) continue;
+            if (is_mesh ? !lights_.is_material(hit.light) : std::holds_alternative<DomeLight>(light.shape)) {
+                add_lpes_of_light(path, Rgb(1.0f), hit.light, hit.radiance, tile);
+            }
             if (is_mesh && !lights_.is_material(hit.light)) {
                 deliver(path, Component::emission, path.weights(), group, hit.radiance, tile);
             } else if (std::holds_alternative<DomeLight>(light.shape)) {
@@ -410,6 +427,9 @@ void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& t
             path.weights(multiplier(light, LightComponent::diffuse), multiplier(light, LightComponent::specular),
                          multiplier(light, LightComponent::refraction));
         deliver(path, Component::background, weights, group, hit.radiance * path.light_share * mis, tile);
+        const Rgb lobes(multiplier(light, LightComponent::diffuse), multiplier(light, LightComponent::specular),
+                        multiplier(light, LightComponent::refraction));
+        add_lpes_of_light(path, lobes, hit.light, hit.radiance * path.light_share * mis, tile);
     }
 }
 
@@ -449,6 +469,28 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
     tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
     tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
+    add_lpes_beyond(path, LpeKind::diffuse, surface.object, sample.light, diffuse_lobe * light_over_pdf, tile);
+    add_lpes_beyond(path, LpeKind::glossy, surface.object, sample.light, specular_lobe * light_over_pdf, tile);
+}
+
+// A light that the path ran into, its lobes weighted by the light's multipliers.
+void PathTracer::add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance,
+                                   Tile& tile) const {
+    for (const LpeTracks::Track& track : path.lpe.tracks) {
+        if (!layout_.lpes[track.lpe].ends_in_light(track.state, std::size_t(light))) continue;
+        const Rgb weight = track.lobes[0] * lobes.x + track.lobes[1] * lobes.y + track.lobes[2] * lobes.z;
+        tile.add_lpe(path.pixel, track.lpe, weight * radiance);
+    }
+}
+
+// A light by way of one more event, at a vertex that the path has come to.
+void PathTracer::add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,
+                                 Tile& tile) const {
+    for (const LpeTracks::Track& track : path.lpe.tracks) {
+        const LpeAutomaton& lpe = layout_.lpes[track.lpe];
+        if (!lpe.ends_in_light(lpe.next(track.state, kind, object), std::size_t(light))) continue;
+        tile.add_lpe(path.pixel, track.lpe, track.sum() * radiance);
+    }
 }
 
 // What is left of a light along a ray; `is_straight` becomes false where a boundary would bend it. Inside ice shadows are
@@ -486,10 +528,10 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
 
     if (is_index_matched(eta) && path.has_direct_light) {
         // No boundary: lights that were chosen at the last vertex are seen as through air.
-        path.last.scale(Rgb(sample.weight / odds));
+        path.scale(Rgb(sample.weight / odds));
     } else {
         path.pass_boundary();
-        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f});
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f}, surface.object);
         path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.is_delta = true;
     }
@@ -497,6 +539,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     // What overlays cover is not seen through; what they scatter the core does not get, so that its share grows.
     const float bare = 1.0f - surface.covering.covered;
     path.begin_piece(core, ice.volume * bare);
+    path.core.is_entered = true;
     path.clear = ice.refraction * bare;
     path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
     path.spread += lobe_spread(refraction_alpha(ice, surface));
@@ -522,11 +565,13 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
         if (scattered.light >= 0 && scattered.radiance != Rgb(0.0f)) {
             deliver(path, Component::volume, path.weights(), group_of_light_[std::size_t(scattered.light)],
                     scattered.radiance * path.volume, tile);
+            add_lpes_beyond(path, LpeKind::volume, std::size_t(body), scattered.light, scattered.radiance * path.volume,
+                            tile);
         }
     }
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
-    path.last.scale(unscattered * exp(medium.sigma_a * -way));
+    path.scale(unscattered * exp(medium.sigma_a * -way));
     path.clear = path.core_share = 1.0f;
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
@@ -587,10 +632,12 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
             const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
             const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value);
             const Light& light = lights_.lights()[std::size_t(sample.light)];
+            const Rgb lobe = color * (value * multiplier(light, LightComponent::refraction));
+            const Rgb arriving = sample.radiance * visible * (mis / sample.pdf);
             Scattering weights = path.weights();
-            weights.scale(color * (value * multiplier(light, LightComponent::refraction)));
-            deliver(path, Component::refraction, weights, group_of_light_[std::size_t(sample.light)],
-                    sample.radiance * visible * (mis / sample.pdf), tile);
+            weights.scale(lobe);
+            deliver(path, Component::refraction, weights, group_of_light_[std::size_t(sample.light)], arriving, tile);
+            add_lpes_beyond(path, LpeKind::diffuse, std::size_t(body), sample.light, lobe * arriving, tile);
         }
     }
     if (path.scattered >= max_bounces_ || path.inner >= kMaxInnerBounces) {
@@ -604,7 +651,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     const float u_side = path.sampler.next_1d();
     const V3f local = cosine_hemisphere(path.sampler.next_2d());
     const V3f wi = Frame(u_side < 0.5f ? normal : -normal).to_world(local);
-    path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)});
+    path.scatter({color, Rgb(0.0f), Rgb(0.0f), cosine_pdf(wi)}, std::size_t(body));
     path.receiver = {position, V3f(0.0f), static_cast<std::uint32_t>(body)};
     path.use = LightUse::refraction;
     path.has_passed = false;
@@ -641,7 +688,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     // What lies on the boundary is seen from below as the core sees it.
     if (const float covered = surface.covering.covered; covered > kHiding) {
         request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
-        path.last.scale(Rgb(1.0f - covered));
+        path.scale(Rgb(1.0f - covered));
         if (covered >= 1.0f) return false;
     }
     const float alpha = refraction_alpha(ice, surface);
@@ -652,7 +699,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const float u_lobe = sampler.next_1d();
     const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
     if (sample.is_reflection) {
-        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f});
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f}, surface.object, LpeKind::inner_reflection);
         path.receive(surface, V3f(0.0f), LightUse::refraction);
         path.has_direct_light = path.sees_lamps = false;
         path.light_share = Rgb(1.0f);
@@ -661,7 +708,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
                         on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
     } else {
         path.pass_boundary();
-        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)});
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)}, surface.object);
         path.receive(surface, -surface.geometric_normal, LightUse::refraction);
         path.is_delta = crossing.to != InsideOf::kNone;
         path.inside = crossing.beyond;
@@ -705,6 +752,8 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
     const Rgb radiance = sample.radiance * visible * beyond.light_share * (mis / sample.pdf);
     deliver(path, Component::refraction, weights, group, radiance, tile);
+    add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light,
+                    radiance * (value * multiplier(light, LightComponent::refraction)), tile);
 }
 
 void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const {
@@ -726,7 +775,13 @@ void PathTracer::request_gather(const Path& path, const Core& core, const Rgb& s
     request.specular = weights.specular;
     (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
     if (weights.sum() == Rgb(0.0f) && !core.is_primary) return;
-    tile.requests.push_back(request);
+    for (const LpeTracks::Track& track : path.lpe.tracks) {
+        const auto seen_from = core.is_entered ? track.previous : track.state;
+        const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
+        if (state == LpeAutomaton::kDead) continue;
+        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share});
+    }
+    tile.requests.push_back(std::move(request));
 }
 
 void PathTracer::add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const {
@@ -782,6 +837,10 @@ void PathTracer::gather(const GatherOptions& options, Tile& tile) const {
                 tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
                 tile.add(request.pixel, Component::specular, group, exitance * request.specular);
                 tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
+                for (const auto& [lpe, state, weight] : request.lpes) {
+                    if (!layout_.lpes[lpe].ends_in_group(state, group)) continue;
+                    tile.add_lpe(request.pixel, lpe, exitance * weight);
+                }
             }
             if (request.is_primary) {
                 const Rgb& total = body.total_reflectance;

@@ -17,6 +17,7 @@
 #include "frazil/render/bodies.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/interior.h"
+#include "frazil/render/lpe_tracks.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
 #include "frazil/render/tile.h"
@@ -69,6 +70,10 @@ class PathTracer {
                        Tile& tile) const;
     void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
     void add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const;
+    // What light path expressions keep.
+    void add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance, Tile& tile) const;
+    void add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,
+                         Tile& tile) const;
     void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, const Rgb* thin_gain,
                     Tile& tile) const;
 

@@ -203,7 +203,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
 RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
                              const Checkpoints* checkpoints) {
     RenderStats stats;
-    FilmLayout layout = make_layout(scene, options.aovs);
+    FilmLayout layout = make_layout(scene, options.aovs, options.lpes);
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
@@ -237,7 +237,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
         do {
             const std::vector<std::size_t> open = canvas.open_tiles();
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
-                Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count());
+                Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size());
                 render_tile(scene, options, tracer, view_axis, filter, canvas, open[i], tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);

@@ -49,16 +49,24 @@ struct GatherRequest {
     // Light that enters right here, for the compensation that fills up; its light group.
     Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;
+    // Of light path expressions: number, state, radiance per exitance.
+    struct Lpe {
+        std::uint32_t lpe = 0, state = 0;
+        Rgb weight = Rgb(0.0f);
+    };
+    std::vector<Lpe> lpes;
 };
 
 class Tile {
   public:
-    // `planes` of translucency beside the components: see FilmLayout.
-    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0)
+    // `planes` of translucency and `lpes`, light path expressions, beside the components: see FilmLayout.
+    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0, std::size_t lpes = 0)
         : groups_(groups),
           plane_count_(planes),
+          lpe_count_(lpes),
           light_(pixels * kComponentCount * groups, Rgb(0.0f)),
           planes_(pixels * planes * groups, Rgb(0.0f)),
+          lpes_(pixels * lpes, Rgb(0.0f)),
           luminance_(pixels * kSampleSubsets),
           normal_(pixels, V3f(0.0f)),
           albedo_(pixels, Rgb(0.0f)),
@@ -79,6 +87,10 @@ class Tile {
 
     void add_to_plane(std::size_t pixel, std::size_t plane, std::size_t group, const Rgb& radiance) {
         if (is_finite(radiance)) planes_[(pixel * plane_count_ + plane) * groups_ + group] += radiance;
+    }
+
+    void add_lpe(std::size_t pixel, std::size_t lpe, const Rgb& radiance) {
+        if (is_finite(radiance)) lpes_[pixel * lpe_count_ + lpe] += radiance;
     }
 
     // What a sample shows first; `seen_through` ice or directly.
@@ -109,6 +121,7 @@ class Tile {
     const Rgb* plane(std::size_t pixel, std::size_t plane) const {
         return &planes_[(pixel * plane_count_ + plane) * groups_];
     }
+    const Rgb& lpe(std::size_t pixel, std::size_t lpe) const { return lpes_[pixel * lpe_count_ + lpe]; }
     const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
     const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
     const Rgb& lacking(std::size_t pixel) const { return lacking_[pixel]; }
@@ -123,8 +136,8 @@ class Tile {
     std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
   private:
-    std::size_t groups_, plane_count_;
-    std::vector<Rgb> light_, planes_;
+    std::size_t groups_, plane_count_, lpe_count_;
+    std::vector<Rgb> light_, planes_, lpes_;
     std::vector<float> luminance_;
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;
