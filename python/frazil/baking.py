@@ -34,7 +34,17 @@ __all__ = ["Bake", "bake", "load_bake", "refresh_bake", "save_bake"]
 _FORMAT = "frazil bake"
 _VERSION = 1
 # What a bake depends on; other options of a render leave it as it is.
-BAKE_OPTIONS = ("seed", "spacing", "spacing_scale", "bake_samples", "bake_bounces", "tolerance", "estimator")
+BAKE_OPTIONS = (
+    "seed",
+    "spacing",
+    "spacing_scale",
+    "bake_samples",
+    "bake_error",
+    "bake_bounces",
+    "translucent_shadows",
+    "tolerance",
+    "estimator",
+)
 
 
 @dataclass
@@ -61,6 +71,8 @@ def bake(
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
     bake_samples: int = 64,
+    bake_error: float = 0.0,
+    translucent_shadows: bool = False,
     bake_bounces: int = 4,
     tolerance: float = 0.01,
     estimator: str = "noise_free",
@@ -97,6 +109,8 @@ def bake(
         "spacing": spacing,
         "spacing_scale": spacing_scale,
         "bake_samples": bake_samples,
+        "bake_error": bake_error,
+        "translucent_shadows": translucent_shadows,
         "bake_bounces": bake_bounces,
         "tolerance": tolerance,
         "estimator": estimator,

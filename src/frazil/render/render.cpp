@@ -203,10 +203,10 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
 RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
                              const Checkpoints* checkpoints) {
     RenderStats stats;
-    FilmLayout layout = make_layout(scene, options.aovs, options.lpes);
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
+    FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes);
     const std::vector<std::string> groups = light_groups(scene.lights);
     if (baked) {
         check_bake(scene, *baked);
