@@ -19,9 +19,13 @@ using FloatInput = std::variant<TextureLookup, float>;
 
 constexpr std::pair<Wrap, const char*> kWrapNames[] = {
     {Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}, {Wrap::mirror, "mirror"}, {Wrap::black, "black"}};
-constexpr std::pair<CompensationMode, const char*> kCompensationNames[] = {
-    {CompensationMode::off, "off"},     {CompensationMode::ratio, "ratio"}, {CompensationMode::conserve, "conserve"},
-    {CompensationMode::depth, "depth"}, {CompensationMode::fill, "fill"},   {CompensationMode::linear, "linear"}};
+const std::pair<CompensationMode, const char*> kCompensationNames[] = {
+    {CompensationMode::off, compensation_name(CompensationMode::off)},
+    {CompensationMode::ratio, compensation_name(CompensationMode::ratio)},
+    {CompensationMode::conserve, compensation_name(CompensationMode::conserve)},
+    {CompensationMode::depth, compensation_name(CompensationMode::depth)},
+    {CompensationMode::fill, compensation_name(CompensationMode::fill)},
+    {CompensationMode::linear, compensation_name(CompensationMode::linear)}};
 
 template <class Enum, std::size_t N>
 Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {

@@ -60,11 +60,10 @@ nb::list knots_of(const Film& film) {
 
 nb::list compensations_of(const Film& film) {
     nb::list rows;
-    constexpr const char* kNames[] = {"off", "ratio", "conserve", "fill", "linear"};
     for (const RenderedCompensation& rendered : film.compensations) {
         nb::dict row;
         row["material"] = rendered.material;
-        row["mode"] = kNames[static_cast<int>(rendered.compensation.mode)];
+        row["mode"] = compensation_name(rendered.compensation.mode);
         row["strength"] = rendered.compensation.strength;
         rows.append(row);
     }

@@ -20,6 +20,24 @@ Rgb covered_fraction(const Rgb& coverage, const Rgb& albedo, bool by_luminance) 
 
 }  // namespace
 
+const char* compensation_name(CompensationMode mode) {
+    switch (mode) {
+        case CompensationMode::off:
+            return "off";
+        case CompensationMode::ratio:
+            return "ratio";
+        case CompensationMode::conserve:
+            return "conserve";
+        case CompensationMode::depth:
+            return "depth";
+        case CompensationMode::fill:
+            return "fill";
+        case CompensationMode::linear:
+            return "linear";
+    }
+    return "";
+}
+
 void check_compensation(const Compensation& compensation, const std::string& path) {
     if (!(compensation.limit >= 1.0f && std::isfinite(compensation.limit))) {
         throw ValueError(str(path, ": limit must be >= 1 and finite, got ", compensation.limit,

@@ -19,6 +19,9 @@ enum class CompensationMode {
     linear,    // M (1 + factor) where factor > 0
 };
 
+// As users write it: "off", "ratio" ...
+const char* compensation_name(CompensationMode mode);
+
 struct Compensation {
     CompensationMode mode = CompensationMode::depth;
     float limit = 8.0f;         // largest gain, >= 1
