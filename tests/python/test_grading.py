@@ -151,9 +151,7 @@ def assert_same_translucency(film, recipe, expected):
     assert np.all(error <= 2.0**-9 * parts + 1e-6), float((error / (parts + 1e-6)).max())
     assert np.ptp(expected["translucency"]) > 0.05
     rest = film["beauty"][:, :, :3].astype(np.float32) - film["translucency"]
-    np.testing.assert_allclose(
-        graded["beauty"][:, :, :3], graded["translucency"] + rest, atol=1e-2
-    )
+    np.testing.assert_allclose(graded["beauty"][:, :, :3], graded["translucency"] + rest, atol=1e-2)
 
 
 @pytest.mark.parametrize("preserve", [False, True])
