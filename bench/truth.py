@@ -18,7 +18,7 @@ import trimesh
 
 import frazil as fz
 
-MODES = ("off", "ratio", "conserve")
+MODES = ("ratio", "conserve", "depth")
 
 
 def look_at(origin: list[float], target: list[float]) -> np.ndarray:
@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("mesh", type=Path, help="the mesh that it shows")
     parser.add_argument("--samples", type=int, default=16, help="camera samples per pixel (default 16)")
     parser.add_argument("--bake-samples", type=int, default=256, help="shadow rays per point and light (default 256)")
-    parser.add_argument("--bounces", type=int, nargs="+", default=[0, 1, 5], help="bake bounces (default 0 1 5)")
+    parser.add_argument("--bounces", type=int, nargs="+", default=[0, 1, 4], help="bake bounces (default 0 1 4)")
     parser.add_argument("--out", type=Path, help="folder for an EXR per mode (default: none is written)")
     args = parser.parse_args()
 

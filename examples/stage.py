@@ -92,7 +92,14 @@ class SceneWriter:
     def _add_materials(self, stage: Usd.Stage) -> dict[str, UsdShade.Material]:
         ice, shader = _material(stage, "Ice", "frazil:ice")
         _inputs(
-            shader, sigma_s_prime=kIceScattering, sigma_a=kIceAbsorption, eta=1.31, compensation="ratio", spacing=0.025
+            # So cloudy that nothing is seen through: refraction would only cost time and noise.
+            shader,
+            sigma_s_prime=kIceScattering,
+            sigma_a=kIceAbsorption,
+            eta=1.31,
+            compensation="ratio",
+            spacing=0.025,
+            refraction=0.0,
         )
         reader = UsdShade.Shader.Define(stage, "/World/Materials/Ice/St")
         reader.CreateIdAttr("UsdPrimvarReader_float2")
