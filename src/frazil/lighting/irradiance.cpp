@@ -136,7 +136,7 @@ class RayMaker {
         const WorldLight& world_light = lights_.world_light(task.light);
         const V3f& position = points_.positions[point];
         const V3f& normal = points_.normals[point];
-        if (!lights_.is_linked(task.light, object_of(point)) || world_light.importance(position) == 0.0f) return;
+        if (!lights_.is_linked(task.light, object_of(point)) || world_light.importance(position, points_.normals[point]) == 0.0f) return;
 
         work.u.resize(whole_.size());
         work.samples.resize(whole_.size());
@@ -187,7 +187,7 @@ class RayMaker {
         work.samples.assign(work.count, LightSample());
         for (std::size_t i = 0; i < work.count; ++i) {
             Sampler random(seed, point, std::uint32_t(i));
-            const LightPick pick = crowd.pick(receiver, work.weights, random.next_1d());
+            const LightPick pick = crowd.pick_one(receiver, work.weights, random.next_1d());
             if (pick.light < 0) return;
             LightSample& sample = work.samples[i];
             sample = lights_.sample_one(pick.light, receiver.position, random.next_2d());

@@ -72,7 +72,20 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
 LightPick LightSampler::pick(const LightReceiver& receiver, float u, LightUse use) const {
     thread_local LightPicker::Weights weights;
     picker(use).weigh(receiver, weights);
-    return picker(use).pick(receiver, weights, u);
+    return picker(use).pick_one(receiver, weights, u);
+}
+
+void LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, std::vector<LightSample>& samples,
+                          LightUse use) const {
+    thread_local LightPicker::Weights weights;
+    thread_local std::vector<LightPick> picks;
+    picker(use).weigh(receiver, weights);
+    picker(use).pick(receiver, weights, u_pick, picks);
+    samples.clear();
+    for (const LightPick& picked : picks) {
+        samples.push_back(sample_one(picked.light, receiver.position, u));
+        samples.back().pdf *= picked.probability;
+    }
 }
 
 LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, LightUse use) const {

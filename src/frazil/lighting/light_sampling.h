@@ -1,6 +1,6 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: one light picked per sample by the irradiance that it can give (light_picker.h), then a direction on it
-//   (world_light.h).
+// Model: lights picked by the irradiance that it can give (light_picker.h), then a direction on it
+//   (world_light.h). As many per receiver as it asks for.
 // Units: pdf per steradian, the pick included.
 // Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose multipliers of the
 //   wanted use are 0, or that is not linked to the receiver's object, is never picked.
@@ -34,7 +34,11 @@ class LightSampler {
 
     // One light for the receiver, without a direction.
     LightPick pick(const LightReceiver& receiver, float u, LightUse use = LightUse::surface) const;
-    // One direction for the receiver; `u_pick` chooses the light, `u` the direction.
+    // A direction to each of the lights that the receiver asks for; `u_pick` chooses them, `u` serves all. Their pdfs are
+    // densities of the expected number of samples.
+    void sample(const LightReceiver& receiver, float u_pick, const V2f& u, std::vector<LightSample>& samples,
+                LightUse use = LightUse::surface) const;
+    // One direction for the receiver.
     LightSample sample(const LightReceiver& receiver, float u_pick, const V2f& u,
                        LightUse use = LightUse::surface) const;
     LightSample sample(const V3f& position, float u_pick, const V2f& u) const {

@@ -27,6 +27,10 @@ constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384
 constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
 // How much wider an opaque surface makes the cone that a path stands for, per metre.
 constexpr float kScatteredSpread = 0.05f;
+// Lights that are asked at a first vertex, about: one that gives a third of the light or more is asked every time.
+constexpr float kFirstPicks = 3.0f;
+// How much of its own width a lobe gives to those that a path meets later.
+constexpr float kLaterWidth = 0.5f;
 
 inline float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
@@ -82,6 +86,7 @@ struct Path {
     InsideOf inside;
     IceCore core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    float least_alpha = 0.0f;           // of glossy lobes that it meets
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
     float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
     LpeTracks lpe;                      // of the light path expressions that are asked for
@@ -132,9 +137,11 @@ struct Path {
         has_direct_light = false;
     }
 
+    // How many lights are asked at the vertex that it has come to.
+    float light_picks() const { return bounce == 0 ? kFirstPicks : 1.0f; }
     // `side` is that of the surface which receives.
-    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
-        receiver = {surface.position, side, surface.object};
+    void receive(const Surface& surface, const V3f& side, LightUse wanted, float picks = 1.0f) {
+        receiver = {surface.position, side, surface.object, picks};
         use = wanted;
         has_passed = false;
     }

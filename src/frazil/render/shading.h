@@ -26,8 +26,9 @@ struct Scattering {
 // The scattering of one surface, directions in world space.
 class Shader {
   public:
-    // `body` is the surface's translucent body, null for other materials.
-    Shader(const Surface& surface, const Body* body);
+    // `body` is the surface's translucent body, null for other materials; glossy lobes are at least as wide as
+    // `least_alpha`.
+    Shader(const Surface& surface, const Body* body, float least_alpha = 0.0f);
 
     // The fraction of light that the surface stops: 1 but for cut-out standard materials.
     float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
