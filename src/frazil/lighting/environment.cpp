@@ -143,8 +143,15 @@ void Environment::set_moments() {
             const double theta = kPiD * (double(y) + 0.5) / double(h), sine = std::sin(theta), cosine = std::cos(theta);
             const double scale = 2.0 * kPiD / double(w) * 2.0 * sine * std::sin(0.5 * kPiD / double(h));
             const double up = sine * cosine * scale, flat = sine * sine * scale;
-            of_row[y] = {sine * scale * s, cosine * scale * sum, -sine * scale * c, flat * (sum - cc),
-                         cosine * cosine * scale * sum, flat * cc, up * s, -flat * cs, -up * c};
+            of_row[y] = {sine * scale * s,
+                         cosine * scale * sum,
+                         -sine * scale * c,
+                         flat * (sum - cc),
+                         cosine * cosine * scale * sum,
+                         flat * cc,
+                         up * s,
+                         -flat * cs,
+                         -up * c};
         }
     });
     Moments total{};
@@ -158,8 +165,8 @@ void Environment::set_moments() {
 
 float Environment::irradiance(const V3f& n) const {
     const auto& [xx, yy, zz, xy, xz, yz] = second_moment_;
-    const float square = n.x * n.x * xx + n.y * n.y * yy + n.z * n.z * zz +
-                         2.0f * (n.x * n.y * xy + n.x * n.z * xz + n.y * n.z * yz);
+    const float square =
+        n.x * n.x * xx + n.y * n.y * yy + n.z * n.z * zz + 2.0f * (n.x * n.y * xy + n.x * n.z * xz + n.y * n.z * yz);
     const float whole = 4.0f * kPi;  // the moment of degree 0
     return 0.25f * whole + 0.5f * n.dot(first_moment_) + 5.0f / 32.0f * (3.0f * square - whole);
 }

@@ -136,7 +136,9 @@ class RayMaker {
         const WorldLight& world_light = lights_.world_light(task.light);
         const V3f& position = points_.positions[point];
         const V3f& normal = points_.normals[point];
-        if (!lights_.is_linked(task.light, object_of(point)) || world_light.importance(position, points_.normals[point]) == 0.0f) return;
+        if (!lights_.is_linked(task.light, object_of(point)) ||
+            world_light.importance(position, points_.normals[point]) == 0.0f)
+            return;
 
         work.u.resize(whole_.size());
         work.samples.resize(whole_.size());

@@ -7,7 +7,6 @@ namespace frazil {
 namespace {
 
 constexpr int kBins = 12;
-constexpr float kBelowOne = 0.99999994f;
 constexpr int kMaxDepth = 48;  // beyond it lights are halved by number
 
 V3f center_of(const Box3f& box) {
@@ -190,7 +189,6 @@ LightPick LightPicker::pick_one(const LightReceiver& receiver, const Weights& we
 
 void LightPicker::pick(const LightReceiver& receiver, const Weights& weights, float u,
                        std::vector<LightPick>& picks) const {
-    picks.clear();
     if (!(receiver.picks > 1.0f)) {
         if (const LightPick pick = pick_one(receiver, weights, u); pick.light >= 0) picks.push_back(pick);
         return;

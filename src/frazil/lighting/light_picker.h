@@ -34,8 +34,10 @@ struct PickEntry {
     float scale = 1.0f;
 };
 
+inline constexpr float kBelowOne = 0.99999994f;  // the largest of numbers in [0, 1)
+
 struct LightPick {
-    int light = -1;  // none
+    int light = -1;            // none
     float probability = 0.0f;  // of being among those that are chosen at a time
 };
 
@@ -55,7 +57,7 @@ class LightPicker {
         float total = 0.0f;
     };
     void weigh(const LightReceiver& receiver, Weights& weights) const;
-    // As many lights as the receiver asks for, or fewer; none of them twice.
+    // Append as many lights as the receiver asks for, or fewer; none of them twice.
     void pick(const LightReceiver& receiver, const Weights& weights, float u, std::vector<LightPick>& picks) const;
     // One light, whatever the receiver asks for, as pick() gives a receiver that asks for one.
     LightPick pick_one(const LightReceiver& receiver, const Weights& weights, float u) const;
@@ -95,10 +97,10 @@ class LightPicker {
     const std::vector<WorldLight>& lights_;
     const LinkTable& links_;
     std::vector<Node> nodes_;
-    std::vector<int> roots_, cut_;    // of nodes_
-    std::vector<int> slot_of_node_;   // in the cut; -1
-    std::vector<int> leaf_of_light_;  // -1 where the picker lacks the light
-    std::vector<Infinite> infinite_;  // slots after the cut's
+    std::vector<int> roots_, cut_;        // of nodes_
+    std::vector<int> slot_of_node_;       // in the cut; -1
+    std::vector<int> leaf_of_light_;      // -1 where the picker lacks the light
+    std::vector<Infinite> infinite_;      // slots after the cut's
     std::vector<int> infinite_of_light_;  // index, -1
 };
 
