@@ -41,10 +41,10 @@ struct BsdfSample {
 // A StandardMaterial at one surface point, its textures read. Directions in the local frame (z = shading normal).
 class StandardBsdf {
   public:
-    // `display_color` replaces the diffuse colour where the material asks for it; lobes are at least as wide as
-    // `least_alpha`.
+    // `display_color` replaces the diffuse colour where the material asks for it.
+    // `blur` is an alpha that makes the glossy lobes broader.
     StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color = Rgb(0.18f),
-                 float least_alpha = 0.0f);
+                 float blur = 0.0f);
 
     // Both zero unless wo and wi lie above the surface.
     BsdfValue eval(const V3f& wo, const V3f& wi) const;

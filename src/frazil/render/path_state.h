@@ -30,8 +30,9 @@ constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
 constexpr float kScatteredSpread = 0.05f;
 // Lights that are asked at a first vertex, about: one that gives a third of the light or more is asked every time.
 constexpr float kFirstPicks = 3.0f;
-// How much of its own width a lobe gives to those that a path meets later.
-constexpr float kLaterWidth = 0.5f;
+
+// What a diffuse lobe counts for in Path::blur.
+constexpr float kDiffuseBlur = 0.3f;
 
 inline float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
@@ -87,8 +88,9 @@ struct Path {
     InsideOf inside;
     IceCore core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
-    float least_alpha = 0.0f;           // of glossy lobes that it meets
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
+    // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
+    float blur = 0.0f;
     float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
     LpeTracks lpe;                      // of the light path expressions that are asked for
 
@@ -113,6 +115,8 @@ struct Path {
         }
         ++bounce;
     }
+
+    void add_blur(float alpha) { blur = std::min(1.0f, std::sqrt(blur * blur + alpha * alpha)); }
 
     void scale(const Rgb& factor) {
         last.scale(factor);

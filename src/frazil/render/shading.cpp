@@ -4,13 +4,13 @@
 
 namespace frazil {
 
-Shader::Shader(const Surface& surface, const Body* body, float least_alpha)
+Shader::Shader(const Surface& surface, const Body* body, float blur)
     : geometric_normal_(surface.geometric_normal), normal_(surface.normal), body_(body) {
     std::tie(tangent_, bitangent_) = tangent_frame(normal_);
     if (body_) {
         const Covering& covering = surface.covering;
         roughness_ = covering.roughness;
-        alpha_ = std::max(alpha_from_roughness(roughness_), least_alpha);
+        alpha_ = alpha_from_roughness(roughness_);
         reflectance_ = covering.reflectance;
         // No lobe starves; ice without overlays has but one.
         if (reflectance_ != Rgb(0.0f)) diffuse_chance_ = std::clamp(0.9f * luminance(reflectance_) + 0.05f, 0.1f, 0.9f);
@@ -18,7 +18,7 @@ Shader::Shader(const Surface& surface, const Body* body, float least_alpha)
                        (body_->material->translucency * (1.0f - covering.scattered));
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
-        standard_.emplace(material, surface.st, surface.display_color, least_alpha);
+        standard_.emplace(material, surface.st, surface.display_color, blur);
     }
 }
 
