@@ -83,6 +83,12 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             const float depth = (surface.position - eye).dot(*view_axis);
             tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1,
                                           surface.st, surface.local_position});
+            if (tile.keeps_places) {
+                Sampler own = path.sampler;
+                own.set_dimension(kOpennessDimensions);
+                tile.places.push_back(
+                    {path.pixel, surface.object, surface.position, surface.geometric_normal, own.next_2d()});
+            }
             tile.add_object(path.pixel, surface.object, false);
             view_axis = nullptr;
         };

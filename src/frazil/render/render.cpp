@@ -4,12 +4,14 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
+#include "frazil/render/openness.h"
 #include "frazil/render/gathering.h"
 #include "frazil/render/path.h"
 #include "frazil/render/stopwatch.h"
@@ -209,12 +211,16 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes);
     const std::vector<std::string> groups = light_groups(scene.lights);
-    if (baked) {
-        check_bake(scene, *baked);
-        plant_trees(baked->bodies, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
-    } else {
-        const Bake fresh = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
-        plant_trees(fresh.bodies, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
+    std::optional<Openness> openness;
+    {
+        if (baked) check_bake(scene, *baked);
+        const Bake fresh = baked ? Bake() : make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
+        const std::vector<LitPoints>& lit = baked ? baked->bodies : fresh.bodies;
+        plant_trees(lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
+        if (layout.has("occlusion") || layout.has("bent_normal")) {
+            Stopwatch watch(stats.seconds["occlusion"]);
+            openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
+        }
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
@@ -240,7 +246,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             const std::vector<std::size_t> open = canvas.open_tiles();
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
                 Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size());
+                tile.keeps_places = openness.has_value();
                 render_tile(scene, options, tracer, gathering, view_axis, filter, canvas, open[i], tile);
+                if (openness) openness->answer(tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);
                 camera_rays += tile.camera_rays;
