@@ -138,21 +138,21 @@ def draw(output: Path, edge: float = 0.21, steps: int = 8) -> dict[str, fz.Point
     sets = {"tessellated": regular, "Poisson": poisson_like(mesh, regular)}
     measured = {name: fz.point_statistics(points, mesh) for name, points in sets.items()}
     view = View(mesh)
-    figure = plt.figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2, 4, height_ratios=(2.1, 1), hspace=0.16, wspace=0.32)
-    least, most = -1.0, 1.0
+    figure = plt.figure(figsize=(11, 6.2))
+    grid = figure.add_gridspec(2, 4, height_ratios=(2.2, 1), hspace=0.08, wspace=0.32)
+    least, most = -0.7, 0.7
     for column, (name, points) in enumerate(sets.items()):
         axis = figure.add_subplot(grid[0, 2 * column : 2 * column + 2])
         seen, is_visible = view.visible(points)
         order = np.argsort(seen[is_visible, 2])
         ratio = np.log10(points.areas[is_visible] / points.areas.mean())[order]
         dots = axis.scatter(*seen[is_visible][order, :2].T, c=ratio, s=2.2, cmap="coolwarm", vmin=least, vmax=most)
-        axis.set(aspect="equal", xticks=[], yticks=[])
+        axis.set(aspect="equal", xticks=[], yticks=[], facecolor="#1d2228")
         axis.set_title(f"{name}: {len(points):,} points", fontsize=11)
         for spine in axis.spines.values():
             spine.set_visible(False)
-    bar = figure.colorbar(dots, ax=figure.axes, fraction=0.018, pad=0.01, ticks=[-1, 0, 1])
-    bar.ax.set_yticklabels(["1/10", "mean", "10 x"], fontsize=8)
+    bar = figure.colorbar(dots, ax=figure.axes, fraction=0.018, pad=0.01, ticks=np.log10([0.2, 0.5, 1, 2, 5]))
+    bar.ax.set_yticklabels(["1/5", "1/2", "mean", "2 x", "5 x"], fontsize=8)
     bar.set_label("area of a point", fontsize=9)
     colors = {"tessellated": "#b5543c", "Poisson": "#2f6db3"}
     near, areas = figure.add_subplot(grid[1, :2]), figure.add_subplot(grid[1, 2:])

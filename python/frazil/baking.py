@@ -46,7 +46,7 @@ BAKE_OPTIONS = (
     "tolerance",
     "estimator",
 )
-# What the core wants to know of a bake beside these: its bits depend on the picture's size by way of spacing_pixels alone.
+# What else the core wants to know; bits depend on the picture's size by way of spacing_pixels alone.
 BAKE_FREE_OPTIONS = ("threads", "width", "height")
 
 

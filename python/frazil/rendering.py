@@ -186,7 +186,9 @@ def render(
         job["resume"] = saved.load()
     bake_stats: dict[str, Any] = {}
     if bake_cache is not None:
-        bake, report = refresh_bake(scene, bake_cache, {k: options[k] for k in (*BAKE_OPTIONS, *BAKE_FREE_OPTIONS)}, progress)
+        bake, report = refresh_bake(
+            scene, bake_cache, {k: options[k] for k in (*BAKE_OPTIONS, *BAKE_FREE_OPTIONS)}, progress
+        )
         bake_stats = {**report.stats, "bake_cache": str(report)}
     if bake is not None:
         job["bake"] = bake

@@ -22,7 +22,9 @@ def twisted(positions):
     x, y, z = positions.astype(np.float64).T
     turn = 1.2 * z
     grown = np.exp(x)
-    return np.float32(np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z * grown], 1))
+    return np.float32(
+        np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z * grown], 1)
+    )
 
 
 def check_areas(points, mesh, thin_walls=True, samples=200_000):

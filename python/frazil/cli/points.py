@@ -27,7 +27,9 @@ def points_command(
     ] = False,
     texture: Annotated[
         Path | None,
-        typer.Option(metavar="IMAGE", help="Spacing by texture: --spacing where it is black, --spacing-max where white."),
+        typer.Option(
+            metavar="IMAGE", help="Spacing by texture: --spacing where it is black, --spacing-max where white."
+        ),
     ] = None,
     camera: Annotated[
         str | None,
@@ -99,7 +101,9 @@ def points_command(
     typer.echo(f"{len(points)} points, spacing {points.spacing:.6g}, area {points.areas.sum(dtype='f8'):.6g}: {output}")
     if stats:
         measured = fz.point_statistics(points, surface, thin_walls=thin_walls)
-        typer.echo(f"nearest pair       {measured.min_distance:.6g} m, {measured.min_distance / points.spacing:.6f} x spacing")
+        typer.echo(
+            f"nearest pair       {measured.min_distance:.6g} m, {measured.min_distance / points.spacing:.6f} x spacing"
+        )
         typer.echo(f"largest gap        {measured.gap:.6g} m, {measured.gap / points.spacing:.6f} x spacing")
         typer.echo(f"mean distance      {measured.mean_distance:.6g} m to the nearest")
         typer.echo(f"distance spread    {measured.distance_spread:.4f} of the mean")

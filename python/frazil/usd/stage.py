@@ -128,9 +128,7 @@ def read_meshes(
     return [(item.path, scene.mesh(item.mesh).transformed(item.matrix)) for item in scene.objects]
 
 
-def _open(
-    path, frame: float | None, purposes: Iterable[str], subdivision_level: int, rest_frame: float | None = None
-):
+def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int, rest_frame: float | None = None):
     """The stage at its time, and the delegate that keeps USD's own messages off the terminal."""
     name = os.fspath(path)
     if frame is not None and not math.isfinite(frame):

@@ -149,8 +149,13 @@ void bind_geometry(nb::module_& module) {
             "__init__",
             [](Mesh* self, const FloatArray& positions, const IntArray& triangles,
                const std::optional<FloatArray>& normals, const std::optional<FloatArray>& uvs) {
-                new (self) Mesh{
-                    to_vectors3(positions, "Mesh: positions"), to_indices3(triangles, "Mesh: triangles"), {}, {}, {}, {}, {}};
+                new (self) Mesh{to_vectors3(positions, "Mesh: positions"),
+                                to_indices3(triangles, "Mesh: triangles"),
+                                {},
+                                {},
+                                {},
+                                {},
+                                {}};
                 check_mesh(*self, "Mesh");
                 if (normals) set_primvar(self->normals, to_vectors3(*normals, "Mesh: normals"), {}, *self, "normals");
                 if (uvs) set_primvar(self->uvs, to_vectors2(*uvs, "Mesh: uvs"), {}, *self, "uvs");

@@ -337,7 +337,8 @@ void bind_ice(nb::module_& module) {
         "profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.\n"
         "compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;\n"
         "    compensation_strength in [0, 1].\n"
-        "spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's vertices.\n\n"
+        "spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's "
+        "vertices.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",

@@ -109,8 +109,8 @@ void save_points(const PointSet& points, const std::string& path) {
         rows.resize(std::min(kRowsAtOnce, points.size() - begin));
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const std::size_t p = begin + i;
-            rows[i] = {points.positions[p], points.normals[p],      points.areas[p],
-                       points.triangles[p], points.barycentrics[p]};
+            rows[i] = {points.positions[p], points.normals[p], points.areas[p], points.triangles[p],
+                       points.barycentrics[p]};
         }
         file.write(reinterpret_cast<const char*>(rows.data()), static_cast<std::streamsize>(rows.size() * sizeof(Row)));
     }

@@ -20,7 +20,7 @@ struct PointSet {
     std::vector<float> areas;
     std::vector<std::int32_t> triangles;
     std::vector<V2f> barycentrics;  // of the triangle's second and third corner
-    double spacing = 0.0;  // the largest, where it varies
+    double spacing = 0.0;           // the largest, where it varies
 
     std::size_t size() const { return positions.size(); }
 };

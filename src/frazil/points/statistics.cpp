@@ -72,7 +72,8 @@ PointStatistics point_statistics(const PointSet& points, const Mesh& mesh, bool 
             const V3i& t = mesh.triangles[triangle];
             const V3d place =
                 V3d(mesh.positions[t.x]) * (1.0 - u - v) + V3d(mesh.positions[t.y]) * u + V3d(mesh.positions[t.z]) * v;
-            gaps[begin / kGrain] = std::max(gaps[begin / kGrain], std::sqrt(tree.nearest(place, normal, thin_walls).distance2));
+            gaps[begin / kGrain] =
+                std::max(gaps[begin / kGrain], std::sqrt(tree.nearest(place, normal, thin_walls).distance2));
         }
     });
     for (const double gap : gaps) result.gap = std::max(result.gap, gap);

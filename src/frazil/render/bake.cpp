@@ -133,9 +133,8 @@ class Shapes {
                    Progress* progress) const {
         const PoissonOptions poisson{options.seed, true, 0};
         const Mesh mesh = transformed(scene_.meshes[object.mesh], shape.stretch);
-        return place_in_rest(mesh, poisson.thin_walls, [&](const Mesh& rest) {
-            return poisson_points(rest, spacing, poisson, progress);
-        });
+        return place_in_rest(mesh, poisson.thin_walls,
+                             [&](const Mesh& rest) { return poisson_points(rest, spacing, poisson, progress); });
     }
 
     const Scene& scene_;

@@ -30,7 +30,7 @@ void check_material(const Material& material) {
     require(ice->compensation.strength >= 0.0f && ice->compensation.strength <= 1.0f,
             "compensation_strength must be in 0..1", ice->compensation.strength);
     require(ice->spacing.value >= 0.0f && std::isfinite(ice->spacing.value), "spacing must be >= 0",
-                ice->spacing.value);
+            ice->spacing.value);
 }
 
 }  // namespace
