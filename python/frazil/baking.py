@@ -48,6 +48,8 @@ BAKE_OPTIONS = (
 )
 # What else the core wants to know; bits depend on the picture's size by way of spacing_pixels alone.
 BAKE_FREE_OPTIONS = ("threads", "width", "height")
+# Properties of ice that change what is seen of it, not what bounces.
+_ONLY_SEEN = ("ramp_", "compensation")
 
 
 @dataclass
@@ -200,7 +202,7 @@ def _hashes(scene: Any, options: dict[str, Any]) -> dict[str, Any]:
     """What the parts of a bake were made of: one text for the points, one per light group."""
     defaults = _frazil.RenderOptions()
     chosen = {name: options.get(name, getattr(defaults, name)) for name in BAKE_OPTIONS}
-    shapes = scene_hash(scene)
+    shapes = scene_hash(scene, _ONLY_SEEN)
     if chosen["spacing_pixels"] > 0:
         size = [options.get(name, getattr(defaults, name)) for name in ("width", "height")]
         shapes = content_hash(shapes, scene.camera, size)
