@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from frazil.formations.contour import contour, corner_normals
+from frazil.formations.sky import make_sky, write_image
 from ice_body import IceBody, kLower, kUpper
 from scenery import Rock, Snow, make_snowfield
-from frazil.formations.sky import make_sky, write_image
 from stage import SceneWriter
 
 kSun = np.array([-0.90, 0.38, -0.42])  # where the sun stands

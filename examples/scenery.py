@@ -10,8 +10,8 @@ Not: snow that has slid or drifted against walls.
 import numpy as np
 
 from frazil.formations.contour import Surface
-from ice_body import IceBody, kLower, kUpper
 from frazil.formations.noise import Noise, swirl
+from ice_body import IceBody, kLower, kUpper
 
 kSnowTop = 0.72  # metres above which no snow holds
 kSnowRoot = 0.05  # metres that snow reaches into the ice below

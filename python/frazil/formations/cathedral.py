@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .contour import contour
-from .formation import CameraRow, Formation, Part, check_parameters, triangle_budget
+from .formation import CameraRow, Formation, Part, check_count, check_parameters, check_within, triangle_budget
 from .noise import Noise, swirl
 from .randomness import generator
 from .solids import block, kUp, shard, solid_of, union
 from .surroundings import ice, kRock, rock_part, sky_and_lights
-from .weathering import Melt, grow
+from .weathering import Melt, Progress, grow
 
 kHeight = 12.0
 _HALF_WIDTH, _TOP = 6.6, 11.2
@@ -34,6 +34,7 @@ def cathedral(
     columns: int = 9,
     opening: float = 1.0,
     rocks: int = 5,
+    progress: Progress | None = None,
 ) -> Formation:
     """A hall of contorted columns of ice with an opening to the sky, rocks frozen in; the camera stands inside.
 
@@ -55,17 +56,17 @@ def cathedral(
         Width of the shaft to the sky, 0 (closed) to 2.
     rocks : int
         Boulders frozen in, 0 to 12.
+    progress : callable, optional
+        Called with a stage and how much of it is done.
 
     Returns
     -------
     Formation
     """
     check_parameters("cathedral", scale, age, seed, detail, triangles)
-    for name, value, most in (("columns", columns, 24), ("rocks", rocks, 12)):
-        if int(value) != value or not 0 <= value <= most:
-            raise ValueError(f"formations.cathedral: {name} must be a whole number from 0 to {most}, got {value}. Choose fewer.")
-    if not 0.0 <= opening <= 2.0:
-        raise ValueError(f"formations.cathedral: opening must be from 0 to 2, got {opening}. 1 is about 4 m wide.")
+    check_count("cathedral", "columns", columns, 0, 24)
+    check_count("cathedral", "rocks", rocks, 0, 12)
+    check_within("cathedral", "opening", opening, 0.0, 2.0, "1 is about 4 m wide at 12 m of height.")
     rng = generator("cathedral", seed)
     budget = triangle_budget(500_000, detail, triangles)
     hall = _Hall(rng, seed, int(columns), opening)
@@ -85,10 +86,11 @@ def cathedral(
         large=melt.large,
         fine=melt.fine,
         keep=lambda p: _keep(p, tips),
+        progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice", 50.0)]
     parts += _rocks(rng, hall, int(rocks), seed)
-    image, lights = sky_and_lights(seed, _SUN, sun_light=10.0, sky_light=1.8)
+    image, lights = sky_and_lights(seed, _SUN, sun_light=17.0, sky_light=3.2)
     return Formation(
         "cathedral",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, columns=columns, opening=opening,

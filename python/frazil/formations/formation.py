@@ -1,6 +1,7 @@
 """What a formation is: plain data, which usd.py writes and Python can take apart.
 
-Model: parts (meshes with a material and a collection each), materials (a shader and its inputs), a sky, lights and a camera.
+Model: parts (meshes with a material and a collection each), materials (a shader and its inputs), a sky, lights, a
+    camera.
 Units: metres, y up; radiance with sunlit snow about 1.
 Not: a Scene; write it as USD and read it with `fz.load_usd`.
 """
@@ -154,6 +155,19 @@ def check_parameters(name: str, scale: float, age: float, seed: int, detail: flo
         refuse("detail", "above 0 and up to 100", detail, "1 is the default number of triangles.")
     if triangles is not None and not kFewest <= triangles <= kMost:
         refuse("triangles", f"from {kFewest} to {kMost}", triangles, "Choose another number, or detail instead.")
+
+
+def check_count(name: str, field_name: str, value: int, least: int, most: int) -> None:
+    """ValueError where a number of things is out of range."""
+    if int(value) != value or not least <= value <= most:
+        rule = f"a whole number from {least} to {most}"
+        raise ValueError(f"formations.{name}: {field_name} must be {rule}, got {value}. Choose another.")
+
+
+def check_within(name: str, field_name: str, value: float, least: float, most: float, remedy: str) -> None:
+    """ValueError where a parameter of one formation is out of range."""
+    if not least <= value <= most:
+        raise ValueError(f"formations.{name}: {field_name} must be from {least:g} to {most:g}, got {value}. {remedy}")
 
 
 def triangle_budget(default: int, detail: float, triangles: int | None) -> int:

@@ -1,8 +1,8 @@
 """Solids that ice is put together from: shards between sharp ridges, broken blocks, boulders.
 
-Model: closed polyhedra of manifold3d, whose booleans keep them closed and keep every ridge exactly where it was. A shard
-    is a polygon swept along a bent axis: its faces are hollow (melting hollows faces and keeps ridges), fluted, and step
-    inwards where pieces have broken off.
+Model: closed polyhedra of manifold3d, whose booleans keep them closed and keep every ridge exactly where it was. A
+    shard is a polygon swept along a bent axis: its faces are hollow (melting hollows faces and keeps ridges), fluted,
+    and step inwards where pieces have broken off.
 Units: metres, y up.
 Not: thin sheets; noise and melting (see weathering.py).
 """
@@ -130,7 +130,7 @@ def shard(
     solid = _swept(p, base, tip)
 
     # Planes where slivers have come off: across a ridge, steeply.
-    for k in range(shaves):
+    for _ in range(shaves):
         turn_at = rng.uniform(0, 2 * np.pi)
         out = np.cos(turn_at) * side + np.sin(turn_at) * other
         at = rng.uniform(0.15, 0.7)

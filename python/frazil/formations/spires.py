@@ -5,12 +5,12 @@ Units: metres, y up; made at a height of 4 m (spires) and 1 m (tips), then scale
 
 import numpy as np
 
-from .formation import CameraRow, Formation, LightRow, check_parameters, triangle_budget
+from .formation import CameraRow, Formation, check_parameters, triangle_budget
 from .noise import Noise, swirl
 from .randomness import generator
 from .solids import block, kUp, shard, union
 from .surroundings import Part, ice, kRock, kSnow, rock_part, sky_and_lights, snowfield
-from .weathering import Melt, grow
+from .weathering import Melt, Progress, grow
 
 kHeight = 4.0
 _SUN = (-0.90, 0.42, -0.48)
@@ -24,6 +24,7 @@ def spire_cluster(
     triangles: int | None = None,
     count: int = 22,
     lean: float = 0.35,
+    progress: Progress | None = None,
 ) -> Formation:
     """Spires of broken glacier ice on a block, rocks frozen in, in snow.
 
@@ -43,18 +44,19 @@ def spire_cluster(
         Large spires, 1 to 60; splinters grow at their feet.
     lean : float
         Radians by which the outer spires lean outwards, 0 to 1.
+    progress : callable, optional
+        Called with a stage and how much of it is done.
 
     Returns
     -------
     Formation
     """
     check_parameters("spire_cluster", scale, age, seed, detail, triangles)
-    _check_count("spire_cluster", count, 60)
-    if not 0.0 <= lean <= 1.0:
-        raise ValueError(f"formations.spire_cluster: lean must be from 0 to 1, got {lean}. It is in radians.")
+    check_count("spire_cluster", "count", count, 1, 60)
+    check_within("spire_cluster", "lean", lean, 0.0, 1.0, "It is in radians.")
     rng = generator("spire_cluster", seed)
     budget = triangle_budget(300_000, detail, triangles)
-    step = 0.05 * np.sqrt(300_000 / max(min(budget, 300_000), 60_000))
+    step = 0.05 * np.sqrt(300_000 / max(min(budget, 300_000), 15_000))
     solids, tips = _cluster(rng, count, lean, step)
     floor = [
         block(rng, (x, rng.uniform(-0.22, 0.05), z), rng.uniform((0.25, 0.25, 0.25), (0.7, 0.42, 0.5)), 10, 0.35)
@@ -75,6 +77,7 @@ def spire_cluster(
         large=melt.large,
         fine=melt.fine,
         keep=lambda p: _keep(p, tips),
+        progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice")]
     for k, (x, z, size) in enumerate([(-1.75, 1.05, 0.40), (2.15, 0.75, 0.46), (0.55, 1.25, 0.20)]):
@@ -86,7 +89,7 @@ def spire_cluster(
         away = np.sqrt((p[:, 0] / 2.7) ** 2 + (p[:, 2] / 1.5) ** 2)
         return 0.22 * np.exp(-np.maximum(away - 0.75, 0.0) / 0.25) * (0.8 + 0.4 * swirl(p, 0.8)[:, 0])
 
-    parts.append(snowfield(seed, 2.0, -0.12, lift=drift))
+    parts.append(snowfield(seed, 2.0, budget, -0.12, lift=drift))
     image, lights = sky_and_lights(seed, _SUN)
     return Formation(
         "spire_cluster",
@@ -106,8 +109,9 @@ def ice_tips(
     detail: float = 1.0,
     triangles: int | None = None,
     count: int = 16,
+    progress: Progress | None = None,
 ) -> Formation:
-    """Slim tips of ice in a row, lit from behind: the close view in which translucency goes dark if it is not compensated.
+    """Slim tips of ice in a row, lit from behind: where translucency goes dark if it is not compensated.
 
     Parameters
     ----------
@@ -123,16 +127,18 @@ def ice_tips(
         How many triangles the ice has, 10,000 to 20,000,000, instead of `detail`.
     count : int
         Tips, 1 to 200.
+    progress : callable, optional
+        Called with a stage and how much of it is done.
 
     Returns
     -------
     Formation
     """
     check_parameters("ice_tips", scale, age, seed, detail, triangles)
-    _check_count("ice_tips", count, 200)
+    check_count("ice_tips", "count", count, 1, 200)
     rng = generator("ice_tips", seed)
     budget = triangle_budget(200_000, detail, triangles)
-    step = 0.014 * np.sqrt(200_000 / max(min(budget, 200_000), 60_000))
+    step = 0.014 * np.sqrt(200_000 / max(min(budget, 200_000), 15_000))
     solids, tips = [], []
     for x in np.linspace(-0.95, 0.95, count) if count > 1 else [0.0]:
         z = rng.uniform(-0.22, 0.16)
@@ -142,7 +148,8 @@ def ice_tips(
         tip = at + height * lean
         tips.append(tip)
         width = height * rng.uniform(0.10, 0.17) + 0.02
-        solids.append(shard(rng, at - 0.1 * kUp, tip, width, step, twist=0.7, bend=0.05, power=(0.9, 1.35), breaks=1, shaves=1))
+        form = dict(twist=0.7, bend=0.05, power=(0.9, 1.35), breaks=1, shaves=1)
+        solids.append(shard(rng, at - 0.1 * kUp, tip, width, step, **form))
         for _ in range(int(rng.integers(1, 4))):
             turn = rng.uniform(0, 2 * np.pi)
             out = np.array([np.cos(turn), 0.0, np.sin(turn)])
@@ -156,7 +163,9 @@ def ice_tips(
     body = union(solids).trim_by_plane((0, 1, 0), -0.22)
     noise = Noise(seed)
     box = (np.array([-2.0, -1.0, -2.0]), np.array([2.0, 2.0, 2.0]))
-    melt = Melt(noise, box, size=0.075, depth=0.005 + 0.008 * age, amount=0.3 + 0.7 * age, stretch=2.0, grain=0.0009, cracks=10)
+    melt = Melt(
+        noise, box, size=0.075, depth=0.005 + 0.008 * age, amount=0.3 + 0.7 * age, stretch=2.0, grain=0.0009, cracks=10
+    )
     points = np.array(tips)
     surface = grow(
         body,
@@ -165,8 +174,9 @@ def ice_tips(
         large=melt.large,
         fine=melt.fine,
         keep=lambda p: _keep(p, points, 0.16),
+        progress=progress,
     )
-    parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 0.5, -0.10)]
+    parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 0.5, budget, -0.10)]
     image, lights = sky_and_lights(seed, (0.55, 0.35, -0.75), sun_light=6.0)
     return Formation(
         "ice_tips",
@@ -194,7 +204,17 @@ def _cluster(rng: np.random.Generator, count: int, lean: float, step: float):
         width = (0.12 + 0.165 * height) * rng.uniform(0.85, 1.2)
         is_broken = k > 2 and rng.random() < 0.22
         solids.append(
-            shard(rng, at - 0.4 * kUp, tip, width, step, shaves=int(rng.integers(3, 7)), is_broken=is_broken, bend=0.07, breaks=3)
+            shard(
+                rng,
+                at - 0.4 * kUp,
+                tip,
+                width,
+                step,
+                shaves=int(rng.integers(3, 7)),
+                is_broken=is_broken,
+                bend=0.07,
+                breaks=3,
+            )
         )
         tips.append(tip)
         for _ in range(int(rng.integers(3, 7))):
@@ -217,8 +237,3 @@ def _keep(points: np.ndarray, tips: np.ndarray, reach: float = 0.55) -> np.ndarr
 
     distance, _ = cKDTree(tips).query(points, distance_upper_bound=reach)
     return np.clip(np.minimum(distance, reach) / reach, 0.05, 1.0)
-
-
-def _check_count(name: str, count: int, most: int) -> None:
-    if int(count) != count or not 1 <= count <= most:
-        raise ValueError(f"formations.{name}: count must be a whole number from 1 to {most}, got {count}. Choose fewer or more.")

@@ -62,8 +62,12 @@ def sheet(height, extent: float, count: int, focus: float = 0.12) -> Surface:
     return Surface(p, np.concatenate([np.stack([a, a + row, a + 1], 1), np.stack([a + 1, a + row, a + row + 1], 1)]))
 
 
-def snowfield(seed: int, size: float, level: float = 0.0, extent: float = 40.0, count: int = 90, lift=None) -> Part:
-    """Wind-blown snow around a formation of `size` metres; `lift` (N,) of points adds drifts."""
+def snowfield(seed: int, size: float, budget: int, level: float = 0.0, extent: float = 40.0, lift=None) -> Part:
+    """Wind-blown snow around a formation of `size` metres; a fifth of the ice's `budget` of triangles, at most 100,000.
+
+    `lift` (N,) of points adds drifts.
+    """
+    count = int(np.sqrt(min(0.2 * budget, 100_000) / 8.0))
     noise = Noise(seed + 2000)
 
     def height(p: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Formations as USD: a crate of meshes with rest positions, materials, collections, lights, a camera, and the sky beside it.
+"""Formations as USD: meshes with rest positions, materials, collections, lights, a camera, and the sky beside it.
 
 Model: UsdGeom, UsdShade (frazil:ice, UsdPreviewSurface), UsdLux, UsdCollectionAPI on the formation's root prim.
 Units: metres, y up.
@@ -31,8 +31,7 @@ def write_formation(formation: Formation, path: str | Path) -> None:
         Where a file cannot be written; what was there before is then left.
     """
     path = Path(path)
-    if path.suffix.lower() not in kSuffixes:
-        raise ValueError(f"{path}: file must end in {', '.join(kSuffixes)}, got {path.suffix!r}. Rename it.")
+    check_suffix(path)
     sky = path.with_name(f"{path.stem}_sky.exr")
     if formation.sky is not None:
         with replacing(sky) as temporary, tempfile.TemporaryDirectory(dir=path.resolve().parent) as folder:
@@ -42,6 +41,12 @@ def write_formation(formation: Formation, path: str | Path) -> None:
     stage = Usd.Stage.CreateInMemory()
     add_formation(stage, formation, f"./{sky.name}")
     export(stage, path)
+
+
+def check_suffix(path: Path) -> None:
+    """ValueError unless the file is named as USD is."""
+    if path.suffix.lower() not in kSuffixes:
+        raise ValueError(f"{path}: file must end in {', '.join(kSuffixes)}, got {path.suffix!r}. Rename it.")
 
 
 def export(stage: Usd.Stage, path: Path) -> None:
@@ -79,7 +84,9 @@ def add_geometry(stage: Usd.Stage, formation: Formation, path: str) -> Usd.Prim:
     for key, value in formation.parameters.items():
         if value is not None:
             root.SetCustomDataByKey(f"frazil:parameters:{key}", value)
-    materials = {name: _add_material(stage, f"{path}/Materials/{name}", row) for name, row in formation.materials.items()}
+    materials = {
+        name: _add_material(stage, f"{path}/Materials/{name}", row) for name, row in formation.materials.items()
+    }
     for part in formation.parts:
         mesh = _add_mesh(stage, f"{path}/{part.name}", part)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(materials[part.material])

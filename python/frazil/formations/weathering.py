@@ -18,6 +18,7 @@ from .contour import Surface
 from .noise import Noise
 from .solids import arrays_of, solid_of
 
+Progress = Callable[[str, float], None]  # (stage, fraction of it in 0..1)
 Displacement = Callable[[np.ndarray, np.ndarray, float], np.ndarray]  # (points, normals, step) -> metres, outwards
 
 kCoarse = 160_000  # triangles at which a surface is rounded and takes its large features
@@ -32,12 +33,15 @@ def grow(
     large: Displacement | None = None,
     fine: Displacement | None = None,
     keep: Callable[[np.ndarray], np.ndarray] | None = None,
+    progress: Progress | None = None,
 ) -> Surface:
     """The surface of `solid` with about that many triangles.
 
     `rounding` is the radius (m) over which edges are worn; `keep` (N,) in 0..1 of points says how much of rounding and
     displacement a place takes (tips take little). `fine` gets the step of the mesh, to leave out what it cannot show.
     """
+    report = progress or (lambda stage, fraction: None)
+    report("surface", 0.0)
     coarse = refine(solid, min(triangles, kCoarse))
     surface = Surface(*arrays_of(coarse))
     step = _step(surface)
@@ -46,12 +50,15 @@ def grow(
         _round(surface, rounding, step, share)
     if large is not None:
         _displace(surface, large, step, share)
+    report("surface", 0.3)
     if triangles > 1.3 * kCoarse:
         surface = Surface(*arrays_of(refine(solid_of(surface.positions, surface.triangles), triangles)))
         step = _step(surface)
         share = np.ones(len(surface.positions)) if keep is None else keep(surface.positions)
+    report("surface", 0.6)
     if fine is not None:
         _displace(surface, fine, step, share)
+    report("surface", 1.0)
     return surface
 
 
@@ -59,7 +66,7 @@ def refine(solid: Manifold, triangles: int) -> Manifold:
     """The solid with long edges split, or small ones merged, until it has about that many triangles."""
     step = np.sqrt(solid.surface_area() * 4.0 / np.sqrt(3.0) / triangles)
     tolerance = 0.02 * step
-    while solid.num_tri() > 0.7 * triangles and tolerance < step:
+    while solid.num_tri() > 0.7 * triangles and tolerance < 8.0 * step:
         solid = solid.simplify(tolerance)
         tolerance *= 1.7
     best = solid
