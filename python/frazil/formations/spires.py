@@ -5,7 +5,7 @@ Units: metres, y up; made at a height of 4 m (spires) and 1 m (tips), then scale
 
 import numpy as np
 
-from .formation import CameraRow, Formation, check_parameters, triangle_budget
+from .formation import CameraRow, Formation, check_count, check_parameters, check_within, triangle_budget
 from .noise import Noise, swirl
 from .randomness import generator
 from .solids import block, kUp, shard, union

@@ -65,19 +65,21 @@ def grow(
 def refine(solid: Manifold, triangles: int) -> Manifold:
     """The solid with long edges split, or small ones merged, until it has about that many triangles."""
     step = np.sqrt(solid.surface_area() * 4.0 / np.sqrt(3.0) / triangles)
+    # Where solids met, edges of different origin would be kept.
+    solid = solid.as_original()
     tolerance = 0.02 * step
     while solid.num_tri() > 0.7 * triangles and tolerance < 8.0 * step:
         solid = solid.simplify(tolerance)
         tolerance *= 1.7
     best = solid
-    for _ in range(4):
+    for _ in range(6):
         if solid.num_tri() > triangles:
             break
         best = solid.refine_to_length(float(step))
         ratio = best.num_tri() / triangles
-        if 0.85 < ratio < 1.15:
+        if 0.85 < ratio < 1.15 or (triangles > 2_000_000 and 0.75 < ratio < 1.35):
             break
-        step *= np.sqrt(ratio) if ratio > 0 else 1.0
+        step *= ratio**0.6
     return best
 
 
