@@ -47,10 +47,19 @@ class Raster {
     static float solid_angle(float cosine) {
         return (2.0f / kSize) * (2.0f / kSize) / std::max(cosine, 1.0f / kSize);
     }
-    // The cell that holds the direction; -1 for none.
-    int cell_of(const V3f& direction) const {
-        const auto index = [](float x) { return std::clamp(int((x + 1.0f) * (0.5f * kSize)), 0, kSize - 1); };
-        return cell_at_[std::size_t(index(direction.y) * kSize + index(direction.x))];
+    // Hide a part of a cell's size about a direction: shared out to the four cells whose middles are nearest.
+    void hide_part(const V3f& direction, float part, std::vector<float>& hidden) const {
+        const float x = (direction.x + 1.0f) * (0.5f * kSize) - 0.5f, y = (direction.y + 1.0f) * (0.5f * kSize) - 0.5f;
+        const int left = int(std::floor(x)), low = int(std::floor(y));
+        for (int k = 0; k < 4; ++k) {
+            const int column = left + (k & 1), row = low + (k >> 1);
+            if (column < 0 || row < 0 || column >= kSize || row >= kSize) continue;
+            const int cell = cell_at_[std::size_t(row * kSize + column)];
+            if (cell < 0) continue;
+            const float share = (1.0f - std::abs(x - float(column))) * (1.0f - std::abs(y - float(row)));
+            float& value = hidden[std::size_t(cell)];
+            value = std::min(1.0f, value + share * part);
+        }
     }
     // Hide what a disk hides: its middle, unit normal and radius.
     void hide_disk(const V3f& to, const V3f& normal, float radius, std::vector<float>& hidden) const {
@@ -125,7 +134,7 @@ class DiskTree {
                     const V3f to_other = points_.positions[other] - position;
                     if (other == point || to_other.length2() > distance * distance) continue;
                     const float area = points_.areas[other];
-                    const float radius = std::sqrt(area * kInvPi) * kOverlap;
+                    const float radius = std::sqrt(area * kInvPi);
                     const V3f local = to_local(to_other);
                     if (local.z + radius <= 0.0f || local.length2() == 0.0f) continue;
                     const V3f facing = to_local(points_.normals[other]);
@@ -146,24 +155,13 @@ class DiskTree {
     struct Node {
         V3f center = V3f(0.0f);
         float radius = 0.0f, area = 0.0f;
-        // Area as seen from the ends of the axes: by those that look to +x, -x, +y and so on.
-        std::array<float, 6> seen{};
+        V3f flow = V3f(0.0f);  // sum of area times normal
         std::size_t begin = 0, end = 0, right = 0, skip = 0;
     };
 
-    // Disks overlap, so that none of the surface shows through between them.
-    static constexpr float kOverlap = 1.15f;
-
-    // What a cluster hides in a direction: the larger of its two sides, as every body has both.
+    // What a cluster hides in a direction: what looks one way by its cosine, the rest as a convex body, a quarter.
     static float seen_area(const Node& node, const V3f& direction) {
-        float near = 0.0f, far = 0.0f;
-        for (int axis = 0; axis < 3; ++axis) {
-            const float share = direction[axis] * direction[axis];
-            const bool is_up = direction[axis] > 0.0f;
-            near += share * node.seen[std::size_t(2 * axis + (is_up ? 1 : 0))];
-            far += share * node.seen[std::size_t(2 * axis + (is_up ? 0 : 1))];
-        }
-        return std::max(near, far);
+        return std::abs(node.flow.dot(direction)) + 0.25f * std::max(0.0f, node.area - node.flow.length());
     }
 
     static void hide_cluster(const V3f& to, float area, const Raster& raster, std::vector<float>& hidden) {
@@ -173,9 +171,8 @@ class DiskTree {
         const float cell = Raster::solid_angle(direction.z);
         if (area > cell * d2) {
             raster.hide_disk(to, direction, std::sqrt(area * kInvPi), hidden);
-        } else if (const int found = raster.cell_of(direction); found >= 0) {
-            float& value = hidden[std::size_t(found)];
-            value = std::min(1.0f, value + area / (cell * d2));
+        } else {
+            raster.hide_part(direction, area / (cell * d2), hidden);
         }
     }
 
@@ -187,10 +184,7 @@ class DiskTree {
             const std::uint32_t point = order_[k];
             box.extendBy(points_.positions[point]);
             nodes_[index].area += points_.areas[point];
-            for (int axis = 0; axis < 3; ++axis) {
-                const float part = points_.areas[point] * points_.normals[point][axis];
-                nodes_[index].seen[std::size_t(2 * axis + (part > 0.0f ? 0 : 1))] += std::abs(part);
-            }
+            nodes_[index].flow += points_.normals[point] * points_.areas[point];
         }
         nodes_[index].center = (box.min + box.max) * 0.5f;
         nodes_[index].radius = 0.5f * (box.max - box.min).length();
