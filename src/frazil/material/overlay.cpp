@@ -31,14 +31,14 @@ float age_weight(const Overlay& overlay, float age) {
 }
 
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const V2f& st, bool with_slope) {
+                       const TexturePoint& texture_at, bool with_slope) {
     Covering all;
-    all.roughness = roughness;
+    all.roughness = all.bare_roughness = roughness;
     for (const Overlay& overlay : overlays) {
         const float strength = overlay.opacity * age_weight(overlay, age);
         if (!(strength > 0.0f)) continue;
         PatternPoint at = point;
-        const float drawn = std::clamp(eval_float(overlay.mask, st), 0.0f, 1.0f);
+        const float drawn = std::clamp(eval_float(overlay.mask, texture_at), 0.0f, 1.0f);
         if (!(drawn > 0.0f)) continue;
         const float mask = eval_pattern(overlay.pattern, at);
         if (with_slope && overlay.bump != 0.0f && mask > 0.0f) {

@@ -4,7 +4,7 @@
 //   without clearcoat reflects all it receives.
 // Units: roughness is the user's (alpha = roughness²).
 // Valid: the ranges of the specification; values outside are clamped to them.
-// Not: refraction, displacement, occlusion.
+// Not: refraction, occlusion.
 #pragma once
 
 #include "frazil/material/texture.h"
@@ -25,6 +25,7 @@ struct StandardMaterial {
     float opacity_threshold = 0.0f;
     float ior = 1.5f;
     TextureLookup normal;  // tangent-space normal map, scale and bias as authored (usually 2 and -1)
+    MaterialInput<float> bump{0.0f, {}};  // height, metres; a texture
 };
 
 // f_r * cos(wi), in the two parts that become AOVs; specular holds the clearcoat.
@@ -42,7 +43,7 @@ struct BsdfSample {
 class StandardBsdf {
   public:
     // `display_color` replaces the diffuse colour where the material asks for it.
-    StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color = Rgb(0.18f));
+    StandardBsdf(const StandardMaterial& material, const TexturePoint& at, const Rgb& display_color = Rgb(0.18f));
 
     // Both zero unless wo and wi lie above the surface.
     BsdfValue eval(const V3f& wo, const V3f& wi) const;
