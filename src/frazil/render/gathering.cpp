@@ -1,0 +1,95 @@
+#include "frazil/render/gathering.h"
+
+#include <algorithm>
+
+namespace frazil {
+
+void Gathering::answer(const GatherOptions& options, Tile& tile) const {
+    // One gather per body: requests grouped by object, in their own order.
+    std::stable_sort(tile.requests.begin(), tile.requests.end(),
+                     [](const GatherRequest& a, const GatherRequest& b) { return a.object < b.object; });
+    std::vector<V3f> positions;
+    for (std::size_t begin = 0; begin < tile.requests.size();) {
+        const Body& body = *bodies_[tile.requests[begin].object];
+        positions.clear();
+        std::size_t end = begin;
+        for (; end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object; ++end) {
+            positions.push_back(tile.requests[end].position);
+        }
+        GatherOptions with_layers = options;
+        with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
+        const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
+        const std::vector<Rgb> thin =
+            thickness_gains(body.thickness.get(), positions.data(), positions.size(), with_layers);
+
+        for (std::size_t i = begin; i < end; ++i) {
+            const GatherRequest& request = tile.requests[i];
+            tile.subset = request.subset;
+            const Rgb& coverage = gathered.coverage[i - begin];
+            const Compensation& compensation = body.material->compensation;
+            const Rgb* thin_gain = thin.empty() ? nullptr : &thin[i - begin];
+            const Rgb gain = body.gain(compensation, coverage, thin_gain);
+            const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
+            for (std::size_t group = 0; group < gathered.groups; ++group) {
+                Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
+                if (group == request.entering_group) exitance += fill;
+                tile.add(request.pixel, Component::translucency, group, exitance * request.translucency);
+                tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
+                tile.add(request.pixel, Component::specular, group, exitance * request.specular);
+                tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
+                for (const auto& [lpe, state, weight] : request.lpes) {
+                    if (!layout_.lpes[lpe].ends_in_group(state, group)) continue;
+                    tile.add_lpe(request.pixel, lpe, exitance * weight);
+                }
+            }
+            if (request.is_primary) {
+                const Rgb& total = body.total_reflectance;
+                Rgb lacking(0.0f);
+                for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
+                tile.add_coverage(request.pixel, coverage, lacking);
+            }
+            if (request.is_primary && layout_.plane_count() > 0)
+                add_planes(request, gathered, i - begin, thin_gain, tile);
+        }
+        begin = end;
+    }
+    tile.requests.clear();
+}
+
+// Translucency once more, apart by ramp knot and as every compensation mode that was asked for would have it.
+void Gathering::add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row,
+                           const Rgb* thin_gain, Tile& tile) const {
+    const Body& body = *bodies_[request.object];
+    const Compensation& rendered = body.material->compensation;
+    const Rgb &coverage = gathered.coverage[row], &weight = request.translucency;
+    const auto fill_of = [&](const Compensation& compensation) {
+        return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
+    };
+    if (!layout_.knots.empty()) {
+        const Rgb scale = body.gain(rendered, coverage, thin_gain) * weight;
+        const std::size_t first = layout_.first_knot[scene_.objects[request.object].material];
+        for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
+            const Rgb* light = gathered.knots > 0 ? &gathered.layers[(row * gathered.knots + k) * gathered.groups]
+                                                  : &gathered.exitance[row * gathered.groups];
+            for (std::size_t g = 0; g < gathered.groups; ++g) {
+                tile.add_to_plane(request.pixel, first + k, g, light[g] * scale);
+            }
+        }
+        if (layout_.fill_plane != FilmLayout::kNone) {
+            tile.add_to_plane(request.pixel, layout_.fill_plane, request.entering_group, fill_of(rendered));
+        }
+    }
+    for (std::size_t m = 0; m < layout_.modes.size(); ++m) {
+        Compensation full = rendered;
+        full.mode = layout_.modes[m];
+        full.strength = 1.0f;
+        const std::size_t plane = layout_.knots.size() + m;
+        const Rgb scale = body.gain(full, coverage, full.mode == rendered.mode ? thin_gain : nullptr) * weight;
+        for (std::size_t g = 0; g < gathered.groups; ++g) {
+            tile.add_to_plane(request.pixel, plane, g, gathered.exitance[row * gathered.groups + g] * scale);
+        }
+        tile.add_to_plane(request.pixel, plane, request.entering_group, fill_of(full));
+    }
+}
+
+}  // namespace frazil
