@@ -177,6 +177,23 @@ Rgb to_color(const TextureLookup& lookup, const Texel& texel) {
 
 }  // namespace
 
+void TexturePoint::set_gradients(const V3f& edge1, const V3f& edge2, const V2f& change1, const V2f& change2) {
+    const V3f cross = edge1.cross(edge2);
+    if (!(cross.length2() > 0.0f)) return;
+    const V3f along1 = edge2.cross(cross) / cross.length2(), along2 = cross.cross(edge1) / cross.length2();
+    s_gradient = along1 * change1.x + along2 * change2.x;
+    t_gradient = along1 * change1.y + along2 * change2.y;
+}
+
+std::pair<V3f, V3f> TexturePoint::st_frame() const {
+    V3f tangent = t_gradient.cross(normal);
+    if (tangent.dot(s_gradient) < 0.0f) tangent = -tangent;
+    if (!(tangent.length2() > 0.0f)) return tangent_frame(normal);
+    tangent.normalize();
+    const V3f bitangent = normal.cross(tangent);
+    return {tangent, bitangent.dot(t_gradient) < 0.0f ? -bitangent : bitangent};
+}
+
 std::shared_ptr<Texture> make_texture(int width, int height, int channels, std::vector<float> texels, Wrap wrap_s,
                                       Wrap wrap_t, const std::string& path) {
     auto texture = std::make_shared<Texture>();
@@ -208,14 +225,8 @@ V3f eval_normal(const TextureLookup& lookup, const TexturePoint& at) {
             result += (at.normal * n.z + p.s * n.x + p.t * n.y) * p.weight;
         }
     } else {
-        // The direction in which s grows and t does not.
-        V3f tangent = at.t_gradient.cross(at.normal);
-        if (tangent.dot(at.s_gradient) < 0.0f) tangent = -tangent;
-        tangent -= at.normal * at.normal.dot(tangent);
-        if (!(tangent.length2() > 0.0f)) return at.normal;
-        tangent.normalize();
-        V3f bitangent = at.normal.cross(tangent);
-        if (bitangent.dot(at.t_gradient) < 0.0f) bitangent = -bitangent;
+        if (at.s_gradient == V3f(0.0f)) return at.normal;
+        const auto [tangent, bitangent] = at.st_frame();
         const V3f n = to_color(lookup, read(lookup, at));
         result = tangent * n.x + bitangent * n.y + at.normal * n.z;
     }

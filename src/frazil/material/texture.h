@@ -27,6 +27,7 @@ struct Texture {
     std::vector<Tile> tiles;              // by ascending number; at least one
     Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;  // of an image that is not UDIM
     float missing[4] = {0, 0, 0, 1};      // r, g, b, a where there is no tile
+    std::string content;                  // tells images apart that are read as they are needed; empty = at hand
 
     bool is_udim() const { return tiles.front().number > 0; }
     // Of the first tile.
@@ -73,6 +74,11 @@ struct TexturePoint {
     // Half axes of the ellipse that is looked at; zero = no filter.
     V3f long_axis = V3f(0.0f), short_axis = V3f(0.0f);
 
+    // From two edges of a triangle and how st changes along them.
+    void set_gradients(const V3f& edge1, const V3f& edge2, const V2f& change1, const V2f& change2);
+    // Unit vectors around the normal: the way in which s grows and t does not, and across it where t grows; any where the
+    // mesh has no st.
+    std::pair<V3f, V3f> st_frame() const;
     V2f st_along(const V3f& v) const { return {s_gradient.dot(v), t_gradient.dot(v)}; }
     // The same by a step along the surface.
     TexturePoint moved(const V3f& step) const {

@@ -31,8 +31,14 @@ std::vector<Rgb> triangle_emission(const Scene& scene, std::uint32_t object) {
     constexpr float kMiddleWeight = 0.225f, kNearWeight = 0.12593918f, kFarWeight = 0.13239415f;
     for (std::uint32_t i = 0; i < result.size(); ++i) {
         const auto emission = [&](float u, float v) {
-            const V2f st = mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, i, {u, v});
-            return eval_color(material->emissive_color, st);
+            TexturePoint at = mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, i, {u, v});
+            at.has_st = !mesh.uvs.is_empty();
+            if (!at.has_st) {  // projected where the mesh has no st: in its own frame
+                const V3i& t = mesh.triangles[i];
+                at.position = mesh.positions[t.x] * (1.0f - u - v) + mesh.positions[t.y] * u + mesh.positions[t.z] * v;
+                at.normal = V3f(triangle_cross(mesh, i).normalized());
+            }
+            return eval_color(material->emissive_color, at);
         };
         if (!material->emissive_color.lookup.texture) {
             result[i] = material->emissive_color.value;
