@@ -28,7 +28,8 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
             const Rgb& coverage = gathered.coverage[i - begin];
             const Compensation& compensation = body.material->compensation;
             const Rgb* thin_gain = thin.empty() ? nullptr : &thin[i - begin];
-            const Rgb gain = body.gain(compensation, coverage, thin_gain);
+            const Rgb gain =
+                body.gain(compensation, coverage, compensation.mode == CompensationMode::depth ? thin_gain : nullptr);
             const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
             for (std::size_t group = 0; group < gathered.groups; ++group) {
                 Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
@@ -48,26 +49,39 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
                 tile.add_coverage(request.pixel, coverage, lacking);
             }
-            if (request.is_primary && layout_.plane_count() > 0)
-                add_planes(request, gathered, i - begin, thin_gain, tile);
+            if (layout_.plane_count() == 0) continue;
+            const Rgb elsewhere = request.diffuse + request.specular + request.refraction;
+            if (request.is_primary) add_planes(request, request.translucency, 0, gathered, i - begin, thin_gain, tile);
+            if (elsewhere != Rgb(0.0f)) {
+                add_planes(request, elsewhere, layout_.seen_plane_count(), gathered, i - begin, thin_gain, tile);
+                for (std::size_t group = 0; group < gathered.groups; ++group) {
+                    const Rgb exitance = gathered.exitance[(i - begin) * gathered.groups + group] * gain;
+                    tile.add_to_plane(request.pixel, layout_.plane_count() - 1, group, exitance * elsewhere);
+                }
+                tile.add_to_plane(request.pixel, layout_.plane_count() - 1, request.entering_group, fill * elsewhere);
+            }
         }
         begin = end;
     }
     tile.requests.clear();
 }
 
-// Translucency once more, apart by ramp knot and as every compensation mode that was asked for would have it.
-void Gathering::add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row,
-                           const Rgb* thin_gain, Tile& tile) const {
+// Light of the core once more, apart by ramp knot and as every compensation mode that was asked for would have it: `weight`
+// is radiance per exitance, `base` the first plane.
+void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
+                           std::size_t row, const Rgb* thin_gain, Tile& tile) const {
     const Body& body = *bodies_[request.object];
     const Compensation& rendered = body.material->compensation;
-    const Rgb &coverage = gathered.coverage[row], &weight = request.translucency;
+    const Rgb& coverage = gathered.coverage[row];
     const auto fill_of = [&](const Compensation& compensation) {
         return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
     };
+    const auto thin_of = [&](const Compensation& compensation) {
+        return compensation.mode == CompensationMode::depth ? thin_gain : nullptr;
+    };
     if (!layout_.knots.empty()) {
-        const Rgb scale = body.gain(rendered, coverage, thin_gain) * weight;
-        const std::size_t first = layout_.first_knot[scene_.objects[request.object].material];
+        const Rgb scale = body.gain(rendered, coverage, thin_of(rendered)) * weight;
+        const std::size_t first = base + layout_.first_knot[scene_.objects[request.object].material];
         for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
             const Rgb* light = gathered.knots > 0 ? &gathered.layers[(row * gathered.knots + k) * gathered.groups]
                                                   : &gathered.exitance[row * gathered.groups];
@@ -76,15 +90,15 @@ void Gathering::add_planes(const GatherRequest& request, const Gathered& gathere
             }
         }
         if (layout_.fill_plane != FilmLayout::kNone) {
-            tile.add_to_plane(request.pixel, layout_.fill_plane, request.entering_group, fill_of(rendered));
+            tile.add_to_plane(request.pixel, base + layout_.fill_plane, request.entering_group, fill_of(rendered));
         }
     }
     for (std::size_t m = 0; m < layout_.modes.size(); ++m) {
         Compensation full = rendered;
         full.mode = layout_.modes[m];
         full.strength = 1.0f;
-        const std::size_t plane = layout_.knots.size() + m;
-        const Rgb scale = body.gain(full, coverage, full.mode == rendered.mode ? thin_gain : nullptr) * weight;
+        const std::size_t plane = base + layout_.knots.size() + m;
+        const Rgb scale = body.gain(full, coverage, thin_of(full)) * weight;
         for (std::size_t g = 0; g < gathered.groups; ++g) {
             tile.add_to_plane(request.pixel, plane, g, gathered.exitance[row * gathered.groups + g] * scale);
         }

@@ -24,8 +24,8 @@ class Gathering {
     void answer(const GatherOptions& options, Tile& tile) const;
 
   private:
-    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, const Rgb* thin_gain,
-                    Tile& tile) const;
+    void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
+                    std::size_t row, const Rgb* thin_gain, Tile& tile) const;
 
     const Scene& scene_;
     const std::vector<std::unique_ptr<Body>>& bodies_;

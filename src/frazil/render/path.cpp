@@ -128,7 +128,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             IceCore core = core_at(surface, static_cast<int>(surface.object));
             core.is_primary = path.bounce == 0;
-            add_entering_light(core, surface, *body, path.sampler);
+            add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {

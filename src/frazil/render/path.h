@@ -68,7 +68,7 @@ class PathTracer {
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
     void request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const;
-    void add_entering_light(IceCore& core, const Surface& surface, const Body& body, Sampler& sampler) const;
+    void add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const;
     // What light path expressions keep.
     void add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance, Tile& tile) const;
     void add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,

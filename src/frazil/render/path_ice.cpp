@@ -181,7 +181,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         const auto seen_from = core.is_entered ? track.previous : track.state;
         const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
         if (state == LpeAutomaton::kDead) continue;
-        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share});
+        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
     }
     tile.requests.push_back(std::move(request));
 }

@@ -152,12 +152,12 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
                     radiance * (value * multiplier(light, LightComponent::refraction)), tile);
 }
 
-void PathTracer::add_entering_light(IceCore& core, const Surface& surface, const Body& body, Sampler& sampler) const {
+void PathTracer::add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const {
     const IceMaterial& ice = *body.material;
-    const bool fills = ice.compensation.mode == CompensationMode::fill;
-    if (!fills && !(core.is_primary && layout_.needs_fill())) return;
-    Sampler copy = sampler;  // a layer that is asked for must not change the picture
-    Sampler& own = fills ? sampler : copy;
+    if (ice.compensation.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+    // Numbers of its own: neither the mode nor a layer that is asked for may change another one.
+    Sampler own = path.sampler;
+    own.set_dimension(kFillDimensions + 4U * path.vertex);
     const float u_pick = own.next_1d();
     const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
     const LightSample sample = lights_.sample(receiver, u_pick, own.next_2d(), LightUse::translucency);

@@ -18,10 +18,11 @@
 namespace frazil {
 
 // Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike; a path that was split
-// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through.
+// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through, and of the
+// light that enters where ice is seen.
 constexpr std::uint32_t kDimensionsPerVertex = 16;
 constexpr std::uint32_t kSplitVertex = 64;
-constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384;
+constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768;
 // Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
 // for what is left.
 constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
