@@ -29,7 +29,8 @@ Light sun_from_x() {
 
 }  // namespace
 
-TEST_CASE("terminator: a low-polygon sphere under grazing light is as its normals say: monotone, without a black band") {
+TEST_CASE(
+    "terminator: a low-polygon sphere under grazing light is as its normals say: monotone, without a black band") {
     const Mesh low = sphere(1.0f, 1);
     Scene scene = scene_of(low, white_diffuse());
     scene.lights = {sun_from_x()};

@@ -177,7 +177,8 @@ TEST_CASE("mipmap: levels that nobody asked for are not kept; the same values co
     for (int i = 0; i < size * size; ++i) texels.push_back(float(i % 97) / 97.0f);
     int loads = 0;
     const auto make = [&](bool is_half) {
-        return Mipmap(size, size, 1, texels, [&] { return ++loads, texels; }, 16, is_half, "/tex");
+        return Mipmap(
+            size, size, 1, texels, [&] { return ++loads, texels; }, 16, is_half, "/tex");
     };
     const Mipmap whole(size, size, 1, texels, "/tex"), coarse_first = make(false), fine_first = make(false);
     CHECK(coarse_first.bytes() == 4 * (256 + 64 + 16 + 4 + 1));
@@ -187,7 +188,8 @@ TEST_CASE("mipmap: levels that nobody asked for are not kept; the same values co
     CHECK(fine_first.bytes() == whole.bytes());
     CHECK(make(true).level(0).at(5) == doctest::Approx(texels[5]).epsilon(5e-4));
     // A file that has gone leaves the finest level that there is.
-    const Mipmap broken(size, size, 1, texels, [] { return std::vector<float>(); }, 16, false, "/tex");
+    const Mipmap broken(
+        size, size, 1, texels, [] { return std::vector<float>(); }, 16, false, "/tex");
     CHECK(broken.level(0).width == 16);
 }
 
@@ -216,8 +218,7 @@ TEST_CASE("texture: an ellipse blurs along its long axis only") {
 TEST_CASE("texture: UDIM tiles by the unit of st, a missing tile by its own value") {
     auto texture = std::make_shared<Texture>();
     for (const auto& [number, value] : {std::pair(1001, 1.0f), {1002, 2.0f}, {1011, 3.0f}}) {
-        texture->tiles.push_back(
-            {number, std::make_shared<Mipmap>(2, 2, 1, std::vector<float>(4, value), "/tex")});
+        texture->tiles.push_back({number, std::make_shared<Mipmap>(2, 2, 1, std::vector<float>(4, value), "/tex")});
     }
     texture->missing[0] = 9.0f;
     CHECK(red(texture, 0.5f, 0.5f) == 1.0f);

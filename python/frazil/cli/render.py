@@ -32,9 +32,9 @@ def render_command(
     ] = None,
     materials: Annotated[
         Path | None,
-        typer.Option(metavar="LOOKS.mtlx", help="A MaterialX file whose look takes the place of the stage's materials."),
+        typer.Option(metavar="LOOKS.mtlx", help="A MaterialX file whose look replaces the stage's materials."),
     ] = None,
-    look: Annotated[str | None, typer.Option(metavar="NAME", help="The look of --materials. Default: its first.")] = None,
+    look: Annotated[str | None, typer.Option(metavar="NAME", help="Of --materials; by default its first.")] = None,
     resolution: Annotated[
         str | None,
         typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),

@@ -1,4 +1,4 @@
-"""Displacement of a material, and the meshes that it moves: refined first, so that they show what image and pattern show."""
+"""Displacement of a material, and the meshes that it moves: refined first, to show what image and pattern show."""
 
 from __future__ import annotations
 
@@ -138,8 +138,8 @@ def displace(
 ) -> tuple[Mesh, np.ndarray]:
     """The mesh refined and moved, and the cage face of each triangle.
 
-    `owner` (faces of the cage) tells whose each face is, `of_owner` who moves it; other faces stay, but for what they share
-    with those. `metres_per_unit` of the mesh's own frame.
+    `owner` (faces of the cage) tells whose each face is, `of_owner` who moves it; other faces stay, but for what they
+    share with those. `metres_per_unit` of the mesh's own frame.
     """
     wanted = min(_edge_length(mesh, d, metres_per_unit) for d in of_owner.values())
     if math.isfinite(wanted):

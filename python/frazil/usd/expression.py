@@ -1,8 +1,8 @@
 """What feeds a shader's input: numbers, or an image with a scale and a bias, and arithmetic on both.
 
-Model: a value of 1 to 4 numbers. Where they come from an image, each is channel * scale + bias, so that sums and products
-with constants stay exact and cost nothing. Anything else is baked: worked out texel by texel, before filtering, into an
-image of its own (the larger of two sizes), read from the files as that is needed.
+Model: a value of 1 to 4 numbers. Where they come from an image, each is channel * scale + bias, so that sums and
+products with constants stay exact and cost nothing. Anything else is baked: worked out texel by texel, before
+filtering, into an image of its own (the larger of two sizes), read from the files as that is needed.
 Units: as authored.
 Not: images that are laid on differently (primvar, transform, wrapping) in one expression.
 """
@@ -47,7 +47,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Expression:
-    """1 to 4 numbers. Without an image `bias` has them; an entry of `channels` is -1 where a number is its bias alone."""
+    """1 to 4 numbers. Without an image `bias` has them; an entry of `channels` is -1 where its bias is all."""
 
     bias: np.ndarray
     scale: np.ndarray = field(default_factory=lambda: np.zeros(0))

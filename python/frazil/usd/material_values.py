@@ -1,4 +1,4 @@
-"""What an input is worth to the core: the expression that feeds it as a number, colour or lookup, in metres and in range."""
+"""What an input is worth to the core: a number, a colour or a lookup, in metres and in range."""
 
 from __future__ import annotations
 

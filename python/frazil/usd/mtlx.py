@@ -1,7 +1,7 @@
 """MaterialX documents as USD: materials for a stage that refers to .mtlx files, or that a document's look overrides.
 
-Model: a document becomes a layer /MaterialX/Materials/NAME of UsdShade prims, as OpenUSD's own reader lays it out, so that
-one reader of networks serves both. Nodes that a document defines by graphs of its own are flattened first.
+Model: a document becomes a layer /MaterialX/Materials/NAME of UsdShade prims, as OpenUSD's own reader lays it out, so
+that one reader of networks serves both. Nodes that a document defines by graphs of its own are flattened first.
 Units: inputs with a unit of length are brought to the stage's; others are as authored, in scene units.
 Not: the document's geometry, property sets, variants, and visibility.
 """
@@ -67,7 +67,8 @@ def read_document(path: str) -> mx.Document:
 
 def to_layer(context: ReadContext, document: mx.Document, path: str, root: str = _ROOT) -> Sdf.Layer:
     """The materials of a document, as an anonymous layer whose default prim is /`root`."""
-    stage = Usd.Stage.CreateInMemory(f"{Path(path).stem}.usda")
+    layer = Sdf.Layer.CreateAnonymous(f"{Path(path).stem}.usda")
+    stage = Usd.Stage.Open(layer)
     stage.SetDefaultPrim(stage.DefinePrim(f"/{root}", "Scope"))
     stage.DefinePrim(f"/{root}/Materials", "Scope")
     is_valid, said = document.validate()
@@ -76,7 +77,7 @@ def to_layer(context: ReadContext, document: mx.Document, path: str, root: str =
     _flatten(document)
     for material in document.getMaterialNodes():
         _Material(context, stage, path, f"/{root}/Materials/{material.getName()}").write(material)
-    return stage.GetRootLayer()
+    return layer
 
 
 def _flatten(document: mx.Document) -> None:
@@ -162,7 +163,7 @@ class _Material:
             name = node_input.getInterfaceName()
             if not name:
                 return node_input
-            graph = node_input.getAncestorOfType(mx.NodeGraph)
+            graph = _graph_of(node_input)
             found = graph.getInput(name) if graph is not None else None
             if found is None:
                 definition = graph.getNodeDef() if graph is not None else None
@@ -204,7 +205,7 @@ class _Material:
         return shader.CreateOutput(holder.getOutputString() or "out", _VALUE_TYPES.Token)
 
     def _sibling(self, element: mx.Element, name: str) -> mx.Node | None:
-        graph = element.getAncestorOfType(mx.NodeGraph) or element.getDocument()
+        graph = _graph_of(element) or element.getDocument()
         return graph.getNode(name)
 
     def _value(self, holder: mx.Input):
@@ -212,6 +213,9 @@ class _Material:
         if kind == "filename":
             name = holder.getActiveFilePrefix() + text
             return Sdf.AssetPath(name if os.path.isabs(name) else str(self._folder / name))
+        if kind == "color3array":
+            numbers = [float(number) for number in text.replace(",", " ").split()]
+            return [Gf.Vec3f(*numbers[i : i + 3]) for i in range(0, len(numbers) - 2, 3)]
         value = holder.getValue()
         if value is None:
             return None
@@ -226,8 +230,6 @@ class _Material:
             return Gf.Vec2f(*(v * factor for v in value))
         if kind in ("color4", "vector4"):
             return Gf.Vec4f(*value)
-        if kind == "color3array":
-            return [Gf.Vec3f(*v.asTuple()) if hasattr(v, "asTuple") else Gf.Vec3f(*v) for v in _triples(value)]
         if kind == "floatarray":
             return [float(v) * factor for v in value]
         return value
@@ -235,17 +237,16 @@ class _Material:
     def _factor(self, holder: mx.Input) -> float:
         """Scene units per authored unit of length."""
         unit = holder.getUnit()
-        if not unit or holder.getActiveUnitType() not in ("", "distance"):
+        if not unit or holder.getUnitType() not in ("", "distance"):
             return 1.0
         return _METRES[unit] / self._context.meters_per_unit if unit in _METRES else 1.0
 
 
-def _triples(values) -> list:
-    """Colours of an array, also where it is a flat list of numbers."""
-    values = list(values)
-    if values and isinstance(values[0], float | int):
-        return [values[i : i + 3] for i in range(0, len(values) - 2, 3)]
-    return values
+def _graph_of(element: mx.Element) -> mx.NodeGraph | None:
+    """The node graph that an element is in."""
+    while element is not None and not isinstance(element, mx.NodeGraph):
+        element = element.getParent()
+    return element
 
 
 # -- stages
@@ -335,12 +336,12 @@ class _Geometry:
     """The prims that a material is assigned to: paths, with what lies below, and wildcards."""
 
     def __init__(self, assign: mx.MaterialAssign) -> None:
-        texts = [assign.getActiveGeom()]
+        texts = [assign.getActiveGeomPrefix() + assign.getGeom()] if assign.getGeom() else []
         collection = assign.getCollection()
         self._excluded: list[str] = []
         if collection is not None:
-            texts.append(collection.getActiveIncludeGeom())
-            self._excluded = _split(collection.getActiveExcludeGeom())
+            texts.append(collection.getIncludeGeom())
+            self._excluded = _split(collection.getExcludeGeom())
         self._included = [name for text in texts for name in _split(text)]
 
     def has(self, path: str) -> bool:

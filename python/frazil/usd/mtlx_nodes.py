@@ -1,7 +1,7 @@
-"""Nodes of MaterialX in a network: images, places, normal maps and arithmetic; others by the node graph that defines them.
+"""Nodes of MaterialX in a network: images, places, normal maps and arithmetic; others by the graph that defines them.
 
-Model: values and images as `Expression`; a node that is not in the tables here but that MaterialX's library defines by a
-graph of others is worked out as that graph.
+Model: values and images as `Expression`; a node that is not in the tables here but that MaterialX's library defines
+by a graph of others is worked out as that graph.
 Not: procedural textures, geometry other than texture coordinates and displayColor: a warning names them once, and the
 input that they feed keeps its default.
 """
@@ -317,7 +317,7 @@ def _triplanar(reader, node, output):
     repeats = 1.0
     found = node.upstream("position")
     while found is not None and found[0].kind == "multiply":
-        fed = [found[0].value(n) for n in ("in1", "in2")]
+        fed = [None if found[0].upstream(n) else found[0].value(n) for n in ("in1", "in2")]
         factor = next((np.asarray(v, float).reshape(-1)[0] for v in fed if v is not None), 1.0)
         repeats *= float(factor)
         found = found[0].upstream("in1") or found[0].upstream("in2")

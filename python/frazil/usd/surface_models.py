@@ -1,8 +1,8 @@
 """standard_surface and open_pbr_surface as what Frazil has: a standard material, or ice where light goes through.
 
-Model: without transmission and subsurface a StandardMaterial. With either an IceMaterial: subsurface by inverting its colour
-and radius to a medium; transmission by Beer-Lambert (color over depth) with rough refraction; what is neither lies over
-it as a diffuse overlay. Where both are there, the one of the larger weight makes the medium.
+Model: without transmission and subsurface a StandardMaterial. With either an IceMaterial: subsurface by inverting its
+colour and radius to a medium; transmission by Beer-Lambert (color over depth) with rough refraction; what is neither
+lies over it as a diffuse overlay. Where both are there, the one of the larger weight makes the medium.
 Units: radius and depth in scene units.
 Not: the inputs of NOT_CARRIED, which are named in one warning where they are authored and would change the picture.
 """
@@ -95,7 +95,10 @@ STANDARD_SURFACE = SurfaceModel(
         ("specular_anisotropy, specular_rotation, tangent", "anisotropic reflection"),
         ("transmission_dispersion", "dispersion"),
         ("sheen, sheen_color, sheen_roughness", "sheen"),
-        ("coat_color, coat_IOR, coat_anisotropy, coat_rotation, coat_normal", "a coat other than clear at the base's IOR"),
+        (
+            "coat_color, coat_IOR, coat_anisotropy, coat_rotation, coat_normal",
+            "a coat other than clear at the base's IOR",
+        ),
         ("coat_affect_color, coat_affect_roughness", "what the coat does to the base below"),
         ("thin_film_thickness, thin_film_IOR", "thin film"),
         ("thin_walled", "thin walls: bodies are solid"),
@@ -184,7 +187,7 @@ class SurfaceModelReader:
             name = shader_input.GetBaseName()
             if self._definition.getActiveInput(name) is None:
                 self._context.warn(self._path, f"has no input '{name}'.")
-        metalness = self._number("metalness")
+        metalness = float(_mean_of(self._get("metalness"))[0])
         transmission = self._get("transmission")
         subsurface = self._get("subsurface")
         is_clear = metalness < 0.5 and (_largest(transmission) > 0.0 or _largest(subsurface) > 0.0)
@@ -222,7 +225,8 @@ class SurfaceModelReader:
         fed = self._reader.read(self._shader, name)
         if fed is None:
             raw = self._reader.raw(self._shader, name)
-            return self._shader.GetInput(name).HasConnectedSource() if raw is None and self._shader.GetInput(name) else False
+            found = self._shader.GetInput(name)
+            return bool(found) and raw is None and found.HasConnectedSource()
         default = self._definition.getActiveInput(name)
         value = default.getValue() if default is not None else None
         if value is None:
@@ -316,7 +320,9 @@ class SurfaceModelReader:
         """The opaque diffuse part, 1 - weight, as an overlay."""
         if _smallest(weight) >= 1.0:
             return []
-        color = np.clip(_mean_of(self._product(self._get("base"), self._get("base_color"), "base").widened(3)), 0.0, 1.0)
+        color = np.clip(
+            _mean_of(self._product(self._get("base"), self._get("base_color"), "base").widened(3)), 0.0, 1.0
+        )
         layer = {"pattern": "solid", "color": tuple(color.tolist()), "scattering": 1.0, "age_end": 0.0}
         roughness = float(np.clip(_mean_of(self._get("roughness"))[0], 0.0, 1.0))
         cover = weight.component(0).affine(-1.0, 1.0)

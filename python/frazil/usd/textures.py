@@ -1,9 +1,9 @@
 """Image files as linear float arrays: found through USD's resolver, in usdz packages and UDIM sets too.
 
-Model: every image is decoded once when the stage is read, so that a broken one is named then. Small ones stay in memory;
-of large ones copies of 64 texels stay, and finer levels are read again when a render first sees them that closely
-(`Texture`). Colour spaces: sRGB and raw here, all others by OpenColorIO through OpenImageIO: names of the configuration
-in $OCIO, else of OpenImageIO's own (lin_rec709, acescg, g22_rec709, adobergb ...).
+Model: every image is decoded once when the stage is read, so that a broken one is named then. Small ones stay in
+memory; of large ones copies of 64 texels stay, and finer levels are read again when a render first sees them that
+closely (`Texture`). Colour spaces: sRGB and raw here, all others by OpenColorIO through OpenImageIO: names of the
+configuration in $OCIO, else of OpenImageIO's own (lin_rec709, acescg, g22_rec709, adobergb ...).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Image:
     missing: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
     notes: list[str] = field(default_factory=list)
     _pixels: dict[int, np.ndarray] = field(default_factory=dict)
-    _textures: dict[tuple[str, str], Texture | None] = field(default_factory=dict)
+    _made: list[TextureTile] | None = None
 
     @property
     def has_alpha(self) -> bool:
@@ -73,12 +73,12 @@ class Image:
         return pixels
 
     def to_texture(self, context: ReadContext, owner, wraps: tuple[str, str]) -> Texture | None:
-        """What the core reads, made once; None, after a warning about `owner`, where no tile can be read."""
-        if wraps not in self._textures:
-            self._textures[wraps] = self._make_texture(context, owner, wraps)
-        return self._textures[wraps]
+        """What the core reads; the pixels are shared. None, after a warning about `owner`, where none can be read."""
+        if self._made is None:
+            self._made = self._make_tiles(context, owner)
+        return Texture.from_tiles(self._made, *wraps, missing=self.missing) if self._made else None
 
-    def _make_texture(self, context: ReadContext, owner, wraps: tuple[str, str]) -> Texture | None:
+    def _make_tiles(self, context: ReadContext, owner) -> list[TextureTile]:
         tiles = []
         for number in sorted(self.tiles):
             try:
@@ -95,7 +95,8 @@ class Image:
             tiles.append(TextureTile(number, pixels, again, _KEPT_TEXELS, self.is_8_bit, f"{number}:{content};"))
         for note in dict.fromkeys(self.notes):
             context.warn(owner, note)
-        return Texture.from_tiles(tiles, *wraps, missing=self.missing) if tiles else None
+        self.notes.clear()
+        return tiles
 
 
 def _guarded(load: Callable[[], np.ndarray], shape: tuple[int, ...]) -> Callable[[], np.ndarray]:
@@ -177,7 +178,9 @@ def read_image(path: str) -> tuple[np.ndarray, bool]:
         message = image.geterror() or "it has no pixels"
         raise TextureError(f"{path}: not a readable image: {message.splitlines()[0]}")
     if spec.width * spec.height > _MOST_PIXELS:
-        raise TextureError(f"{path}: size must be at most 2^30 pixels, got {spec.width} x {spec.height}. Use UDIM tiles.")
+        raise TextureError(
+            f"{path}: size must be at most 2^30 pixels, got {spec.width} x {spec.height}. Use UDIM tiles."
+        )
     is_8_bit = spec.format.basetype == oiio.UINT8
     pixels = image.get_pixels(oiio.FLOAT)
     if pixels is None or image.has_error:
@@ -245,7 +248,9 @@ def _look_at(path: str) -> tuple[int, bool]:
     spec = source.spec()
     source.close()
     if spec.width * spec.height > _MOST_PIXELS:
-        raise TextureError(f"{path}: size must be at most 2^30 pixels, got {spec.width} x {spec.height}. Use UDIM tiles.")
+        raise TextureError(
+            f"{path}: size must be at most 2^30 pixels, got {spec.width} x {spec.height}. Use UDIM tiles."
+        )
     return min(spec.nchannels, 4), spec.format.basetype == oiio.UINT8
 
 

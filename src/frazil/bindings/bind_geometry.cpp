@@ -144,7 +144,8 @@ void bind_control_mesh(nb::module_& module) {
             return std::tuple(std::move(cut.mesh), to_array(std::move(cut.parents)), longest);
         },
         "mesh"_a, "edge_length"_a, "most_triangles"_a = std::size_t(4000000),
-        "Halve edges until none is longer than edge_length: (Mesh, the triangle that each was cut from (F,) int32, the\n"
+        "Halve edges until none is longer than edge_length: (Mesh, the triangle that each was cut from (F,) int32, "
+        "the\n"
         "longest edge that is left). No more than most_triangles are made.");
     module.def(
         "displaced",
@@ -154,7 +155,8 @@ void bind_control_mesh(nb::module_& module) {
             return displaced(mesh, vectors);
         },
         "mesh"_a, "offsets"_a,
-        "Move the vertices by offsets (3F, 3) at the corners of the triangles, their mean at each vertex, and give the\n"
+        "Move the vertices by offsets (3F, 3) at the corners of the triangles, their mean at each vertex, and give "
+        "the\n"
         "shape its normals. No cracks open.");
 }
 

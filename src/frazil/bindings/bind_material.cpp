@@ -52,8 +52,7 @@ void def_input(Class& cls, const char* name, MaterialInput<Value> Model::*member
 template <class Model, class Class>
 void def_normal(Class& cls) {
     cls.def_prop_rw(
-        "normal",
-        [](const Model& model) { return model.normal.texture ? std::optional(model.normal) : std::nullopt; },
+        "normal", [](const Model& model) { return model.normal.texture ? std::optional(model.normal) : std::nullopt; },
         [](Model& model, const std::optional<TextureLookup>& map) { model.normal = map.value_or(TextureLookup{}); },
         "value"_a.none());
 }
@@ -72,9 +71,9 @@ void bind_standard(nb::module_& module) {
            const FloatInput& clearcoat_roughness, const FloatInput& opacity, float opacity_threshold, float ior,
            const std::optional<TextureLookup>& normal, const FloatInput& bump) {
             new (self) StandardMaterial{
-                to_input(diffuse_color),         uses_display_color, to_input(emissive_color), use_specular_workflow,
-                to_input(specular_color),        to_input(metallic), to_input(roughness),      to_input(clearcoat),
-                to_input(clearcoat_roughness),   to_input(opacity),  opacity_threshold,        ior,
+                to_input(diffuse_color),          uses_display_color, to_input(emissive_color), use_specular_workflow,
+                to_input(specular_color),         to_input(metallic), to_input(roughness),      to_input(clearcoat),
+                to_input(clearcoat_roughness),    to_input(opacity),  opacity_threshold,        ior,
                 normal.value_or(TextureLookup{}), to_input(bump)};
         },
         nb::kw_only(), "diffuse_color"_a = ColorInput(from_v3f(preset.diffuse_color.value)),
@@ -281,8 +280,8 @@ void bind_ice(nb::module_& module) {
         "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "priority"_a = 0, "overlays"_a = std::vector<Overlay>(),
         "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
         "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
-        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f,
-        "normal"_a = nb::none(), "bump"_a = FloatInput(0.0f));
+        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f, "normal"_a = nb::none(),
+        "bump"_a = FloatInput(0.0f));
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);
     def_input(cls, "bump", &IceMaterial::bump);
@@ -361,10 +360,9 @@ void bind_displacement(nb::module_& module) {
             nb::kw_only(), "height"_a = FloatInput(0.0f), "vector"_a = nb::none(), "space"_a = "tangent",
             "pattern"_a = nb::none())
         .def_prop_ro("height", [](const Displacement& d) { return from_input(d.height); })
-        .def_prop_ro("vector",
-                     [](const Displacement& d) {
-                         return d.vector ? std::optional(from_input(*d.vector)) : std::nullopt;
-                     })
+        .def_prop_ro(
+            "vector",
+            [](const Displacement& d) { return d.vector ? std::optional(from_input(*d.vector)) : std::nullopt; })
         .def_prop_ro("space", [](const Displacement& d) { return to_name(kSpaceNames, d.space); })
         .def(
             "eval",

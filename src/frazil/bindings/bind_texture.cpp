@@ -58,7 +58,8 @@ void bind_texture(nb::module_& module) {
         "Parameters\n----------\n"
         "number : UDIM, 1001 and on; 0 = the image of all st.\n"
         "texels : (height, width, channels) float32, linear, 1 to 4 channels, row 0 on top.\n"
-        "load : function without arguments that gives the same texels again. With it only copies of at most `kept` texels\n"
+        "load : function without arguments that gives the same texels again. With it only copies of at most `kept` "
+        "texels\n"
         "    on a side are kept now, and finer ones when they are first seen; it may be called from any thread.\n"
         "is_half : keep them as half floats.")
         .def(
@@ -67,17 +68,16 @@ void bind_texture(nb::module_& module) {
                int kept, bool is_half, std::string content) {
                 check_shape(texels, "TextureTile");
                 const int width = int(texels.shape(1)), height = int(texels.shape(0)), channels = int(texels.shape(2));
-                auto image = load ? std::make_shared<Mipmap>(width, height, channels, copy_texels(texels),
-                                                             to_loader(*load), kept, is_half, "TextureTile")
-                                  : std::make_shared<Mipmap>(width, height, channels, copy_texels(texels),
-                                                             "TextureTile");
+                auto image =
+                    load ? std::make_shared<Mipmap>(width, height, channels, copy_texels(texels), to_loader(*load),
+                                                    kept, is_half, "TextureTile")
+                         : std::make_shared<Mipmap>(width, height, channels, copy_texels(texels), "TextureTile");
                 new (self) TileOfTexture{{number, std::move(image)}, std::move(content)};
             },
             "number"_a, "texels"_a, "load"_a = nb::none(), "kept"_a = 64, "is_half"_a = false, "content"_a = "")
         .def_prop_ro("number", [](const TileOfTexture& tile) { return tile.tile.number; })
         .def(
-            "memory", [](const TileOfTexture& tile) { return tile.tile.image->bytes(); },
-            "Bytes that are kept now.");
+            "memory", [](const TileOfTexture& tile) { return tile.tile.image->bytes(); }, "Bytes that are kept now.");
 
     nb::class_<Texture>(module, "Texture",
                         "An image on a surface.\n\n"
@@ -201,8 +201,9 @@ void bind_texture(nb::module_& module) {
         .def_ro("is_triplanar", &TextureLookup::is_triplanar)
         .def_ro("triplanar_size", &TextureLookup::triplanar_size)
         .def("__repr__", [](const TextureLookup& lookup) {
-            return str("TextureLookup(", lookup.texture ? str(lookup.texture->width(), "x", lookup.texture->height()) : "",
-                       ", channel ", lookup.first_channel, ")");
+            return str("TextureLookup(",
+                       lookup.texture ? str(lookup.texture->width(), "x", lookup.texture->height()) : "", ", channel ",
+                       lookup.first_channel, ")");
         });
 }
 

@@ -176,12 +176,18 @@ Mesh displaced(const Mesh& mesh, const std::vector<V3f>& offsets) {
     const auto vertex_of = [&](std::size_t corner) { return mesh.triangles[corner / 3][int(corner % 3)]; };
     std::vector<V3f> sums(mesh.positions.size(), V3f(0.0f));
     std::vector<int> counts(mesh.positions.size(), 0);
-    for (std::size_t i = 0; i < corners; ++i) {
-        if (!is_finite(offsets[i])) {
-            throw ValueError(str("displaced: offsets must be finite, got ", offsets[i].x, " at triangle ", i / 3, "."));
+    // Triangles without area have a say only where there are no others.
+    for (const bool has_area : {true, false}) {
+        const std::vector<int> before = counts;
+        for (std::size_t i = 0; i < corners; ++i) {
+            if (!is_finite(offsets[i])) {
+                throw ValueError(
+                    str("displaced: offsets must be finite, got ", offsets[i].x, " at triangle ", i / 3, "."));
+            }
+            if ((triangle_cross(mesh, i / 3).length2() > 0.0) != has_area || before[vertex_of(i)] > 0) continue;
+            sums[vertex_of(i)] += offsets[i];
+            ++counts[vertex_of(i)];
         }
-        sums[vertex_of(i)] += offsets[i];
-        ++counts[vertex_of(i)];
     }
     Mesh result = mesh;
     for (std::size_t v = 0; v < sums.size(); ++v) {

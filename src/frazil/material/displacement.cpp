@@ -10,8 +10,8 @@ namespace frazil {
 
 void check_displacement(const Displacement& displacement, const std::string& path) {
     if (!std::isfinite(displacement.height.value)) {
-        throw ValueError(str(path, ": displacement must be finite, got ", displacement.height.value,
-                             ". Mend the shader's input."));
+        throw ValueError(
+            str(path, ": displacement must be finite, got ", displacement.height.value, ". Mend the shader's input."));
     }
     if (displacement.pattern) check_pattern(*displacement.pattern, path);
 }
@@ -24,7 +24,7 @@ std::vector<V3f> eval_displacement(const Displacement& displacement, const Mesh&
             const auto number = std::uint32_t(triangle);
             const V3f e1 = mesh.positions[t.y] - mesh.positions[t.x], e2 = mesh.positions[t.z] - mesh.positions[t.x];
             const V3f cross = e1.cross(e2);
-            if (!(cross.length2() > 0.0f)) continue;
+            if (!(cross.length2() > 0.0f) && mesh.normals.is_empty()) continue;
             TexturePoint at;
             at.has_st = !mesh.uvs.is_empty();
             if (at.has_st) {

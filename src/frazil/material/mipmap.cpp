@@ -61,8 +61,8 @@ Mipmap::Mipmap(int width, int height, int channels, std::vector<float> texels, c
     keep(std::move(texels), 0);
 }
 
-Mipmap::Mipmap(int width, int height, int channels, std::vector<float> texels,
-               std::function<std::vector<float>()> load, int kept, bool is_half, const std::string& path)
+Mipmap::Mipmap(int width, int height, int channels, std::vector<float> texels, std::function<std::vector<float>()> load,
+               int kept, bool is_half, const std::string& path)
     : width_(width), height_(height), channels_(channels), is_half_(is_half), load_(std::move(load)) {
     check(texels, path);
     level_count_ = int(std::bit_width(unsigned(std::max(width, height))));
@@ -80,13 +80,13 @@ void Mipmap::check(const std::vector<float>& texels, const std::string& path) co
         throw ValueError(str(path, ": channels must be 1 to 4, got ", channels_, ". Convert the image."));
     }
     if (width_ < 1 || height_ < 1) {
-        throw ValueError(str(path, ": size must be at least 1 x 1, got ", width_, " x ", height_,
-                             ". Give an image with pixels."));
+        throw ValueError(
+            str(path, ": size must be at least 1 x 1, got ", width_, " x ", height_, ". Give an image with pixels."));
     }
     const std::size_t expected = std::size_t(width_) * std::size_t(height_) * std::size_t(channels_);
     if (texels.size() != expected) {
-        throw ValueError(str(path, ": texels must be width * height * channels = ", expected, " values, got ",
-                             texels.size(), "."));
+        throw ValueError(
+            str(path, ": texels must be width * height * channels = ", expected, " values, got ", texels.size(), "."));
     }
     for (std::size_t i = 0; i < expected; ++i) {
         if (std::isfinite(texels[i])) continue;

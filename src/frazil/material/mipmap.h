@@ -22,7 +22,7 @@ namespace frazil {
 // One level; row 0 is the top.
 struct MipLevel {
     int width = 0, height = 0;
-    std::vector<float> texels;         // or, where that is enough,
+    std::vector<float> texels;          // or, where that is enough,
     std::vector<std::uint16_t> halves;  // the bits of half floats
 
     float at(std::size_t index) const { return halves.empty() ? texels[index] : half_value(halves[index]); }

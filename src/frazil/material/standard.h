@@ -24,7 +24,7 @@ struct StandardMaterial {
     MaterialInput<float> opacity{1.0f, {}};
     float opacity_threshold = 0.0f;
     float ior = 1.5f;
-    TextureLookup normal;  // tangent-space normal map, scale and bias as authored (usually 2 and -1)
+    TextureLookup normal;                 // tangent-space normal map, scale and bias as authored (usually 2 and -1)
     MaterialInput<float> bump{0.0f, {}};  // height, metres; a texture
 };
 

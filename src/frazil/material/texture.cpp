@@ -133,13 +133,12 @@ struct Projection {
 
 std::array<Projection, 3> projections(const V3f& normal) {
     const auto sign = [](float v) { return v < 0.0f ? -1.0f : 1.0f; };
-    std::array<Projection, 3> result{
-        Projection{std::pow(std::abs(normal.x), kBlend), V3f(0, 0, -sign(normal.x)), V3f(0, 1, 0),
-                   V3f(sign(normal.x), 0, 0)},
-        Projection{std::pow(std::abs(normal.y), kBlend), V3f(1, 0, 0), V3f(0, 0, -sign(normal.y)),
-                   V3f(0, sign(normal.y), 0)},
-        Projection{std::pow(std::abs(normal.z), kBlend), V3f(sign(normal.z), 0, 0), V3f(0, 1, 0),
-                   V3f(0, 0, sign(normal.z))}};
+    std::array<Projection, 3> result{Projection{std::pow(std::abs(normal.x), kBlend), V3f(0, 0, -sign(normal.x)),
+                                                V3f(0, 1, 0), V3f(sign(normal.x), 0, 0)},
+                                     Projection{std::pow(std::abs(normal.y), kBlend), V3f(1, 0, 0),
+                                                V3f(0, 0, -sign(normal.y)), V3f(0, sign(normal.y), 0)},
+                                     Projection{std::pow(std::abs(normal.z), kBlend), V3f(sign(normal.z), 0, 0),
+                                                V3f(0, 1, 0), V3f(0, 0, sign(normal.z))}};
     const float sum = result[0].weight + result[1].weight + result[2].weight;
     for (Projection& p : result) p.weight = sum > 0.0f ? p.weight / sum : 1.0f / 3.0f;
     return result;

@@ -24,10 +24,10 @@ struct Texture {
         int number = 0;  // UDIM, 1001 and on; 0 = the image of all st
         std::shared_ptr<const Mipmap> image;
     };
-    std::vector<Tile> tiles;              // by ascending number; at least one
+    std::vector<Tile> tiles;                            // by ascending number; at least one
     Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;  // of an image that is not UDIM
-    float missing[4] = {0, 0, 0, 1};      // r, g, b, a where there is no tile
-    std::string content;                  // tells images apart that are read as they are needed; empty = at hand
+    float missing[4] = {0, 0, 0, 1};                    // r, g, b, a where there is no tile
+    std::string content;  // tells images apart that are read as they are needed; empty = at hand
 
     bool is_udim() const { return tiles.front().number > 0; }
     // Of the first tile.
@@ -51,7 +51,7 @@ struct TextureLookup {
     // st' = rotate(st * st_scale, st_rotation degrees) + st_translation
     V2f st_scale = V2f(1.0f), st_translation = V2f(0.0f);
     float st_rotation = 0.0f;
-    bool is_triplanar = false;     // projected even where there are texture coordinates
+    bool is_triplanar = false;    // projected even where there are texture coordinates
     float triplanar_size = 1.0f;  // of one repeat of a projected image, metres
 };
 
@@ -68,7 +68,7 @@ struct TexturePoint {
     TexturePoint(const V2f& texture_coordinates) : st(texture_coordinates) {}  // NOLINT: a place is a place
 
     V2f st = V2f(0.0f);
-    bool has_st = true;                                // else textures are projected
+    bool has_st = true;                                  // else textures are projected
     V3f s_gradient = V3f(0.0f), t_gradient = V3f(0.0f);  // of st along the surface, 1/m
     V3f position = V3f(0.0f), normal = V3f(0, 1, 0);
     // Half axes of the ellipse that is looked at; zero = no filter.

@@ -14,8 +14,8 @@ Shader::Shader(const Surface& surface, const Body* body)
         reflectance_ = covering.reflectance;
         // No lobe starves; ice without overlays has but one.
         if (reflectance_ != Rgb(0.0f)) diffuse_chance_ = std::clamp(0.9f * luminance(reflectance_) + 0.05f, 0.1f, 0.9f);
-        core_albedo_ = body_->total_reflectance * eval_color(body_->material->tint, surface.texture_point) * covering.tint *
-                       (body_->material->translucency * (1.0f - covering.scattered));
+        core_albedo_ = body_->total_reflectance * eval_color(body_->material->tint, surface.texture_point) *
+                       covering.tint * (body_->material->translucency * (1.0f - covering.scattered));
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
         standard_.emplace(material, surface.texture_point, surface.display_color);

@@ -166,17 +166,16 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     surface.normal = surface.geometric_normal;
     if (!mesh.normals.is_empty()) {
         const M44f& world_to_local = frames_[hit.placement].world_to_local;
-        const V3f normal =
-            transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local);
+        const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local);
         if (is_finite(normal) && normal.length2() > 0.0f) {
             surface.normal = bent_towards_viewer(towards(normal, surface.geometric_normal), wo);
             V3f corners[3], normals[3];
             for (int k = 0; k < 3; ++k) {
                 corners[k] = mesh.positions[triangle[k]] * object.local_to_world;
                 const V2f corner(k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f);
-                normals[k] = towards(
-                    transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
-                    surface.geometric_normal);
+                normals[k] =
+                    towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
+                            surface.geometric_normal);
             }
             const V3f place = lifted(corners, normals, hit.uv, surface.position);
             if (is_finite(place)) surface.lifted = place;
@@ -219,7 +218,8 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     if (mapped != at.normal) {
         V3f normal;
         rest_to_world(hit.placement).multDirMatrix(mapped * side, normal);
-        if (normal.dot(surface.geometric_normal) <= 0.0f) normal -= surface.geometric_normal * (normal.dot(surface.geometric_normal) - 1e-3f);
+        if (normal.dot(surface.geometric_normal) <= 0.0f)
+            normal -= surface.geometric_normal * (normal.dot(surface.geometric_normal) - 1e-3f);
         surface.normal = bent_towards_viewer(normal.normalized(), wo);
     }
     return surface;
