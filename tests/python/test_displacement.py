@@ -197,6 +197,18 @@ def test_values_out_of_range_are_named(tmp_path):
     assert any("has no input 'heigth'. The nearest is 'height'" in w for w in said)
 
 
+def test_a_deforming_mesh_keeps_its_triangles_and_its_rest_pose():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    rest = fz.Mesh(square, triangles)
+    pose = fz.Mesh(square * [3, 1, 1], triangles)
+    pose.set_rest(square)
+    of_rest, of_pose = (fz._frazil.cut_long_edges(mesh, 0.2)[0] for mesh in (rest, pose))
+    np.testing.assert_array_equal(of_rest.triangles, of_pose.triangles)
+    np.testing.assert_allclose(of_pose.positions, of_rest.positions * [3, 1, 1], atol=1e-6)
+    np.testing.assert_allclose(of_pose.rest, of_rest.positions, atol=1e-6)
+
+
 def test_python_arguments_are_checked():
     mesh = fz.Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32))
     with pytest.raises(ValueError, match="offsets must be 3 per triangle, 3, got 2"):

@@ -475,6 +475,86 @@ def test_bump_of_a_height_image_tilts_towards_its_fall(stage, tmp_path):
     np.testing.assert_allclose(n, np.array([-slope, 0, 1]) / np.hypot(slope, 1), atol=1e-4)
 
 
+# Documents as they are found: of an older version, with a file prefix, procedural textures, a tint without a depth.
+FOUND = {
+    "brass": """<?xml version="1.0"?>
+<materialx version="1.38" colorspace="lin_rec709" fileprefix="./tex/">
+  <nodegraph name="NG_brass1">
+    <tiledimage name="image_color" type="color3">
+      <input name="file" type="filename" value="color.png" colorspace="srgb_texture" /></tiledimage>
+    <tiledimage name="image_roughness" type="float">
+      <input name="file" type="filename" value="roughness.png" /></tiledimage>
+    <output name="out_color" type="color3" nodename="image_color" />
+    <output name="out_roughness" type="float" nodename="image_roughness" />
+  </nodegraph>
+  <standard_surface name="SR_brass1" type="surfaceshader">
+    <input name="base_color" type="color3" nodegraph="NG_brass1" output="out_color" />
+    <input name="specular_roughness" type="float" nodegraph="NG_brass1" output="out_roughness" />
+    <input name="metalness" type="float" value="1" />
+    <input name="coat_color" type="color3" nodegraph="NG_brass1" output="out_color" />
+  </standard_surface>
+  <surfacematerial name="Look" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="SR_brass1" /></surfacematerial>
+</materialx>""",
+    "marble": """<?xml version="1.0"?>
+<materialx version="1.38" colorspace="lin_rec709">
+  <nodegraph name="NG_marble1">
+    <input name="base_color_1" type="color3" value="0.8, 0.8, 0.8" uiname="Color 1" />
+    <input name="base_color_2" type="color3" value="0.1, 0.1, 0.3" />
+    <position name="obj_pos" type="vector3" />
+    <fractal3d name="noise" type="float"><input name="octaves" type="integer" value="3" />
+      <input name="position" type="vector3" nodename="obj_pos" /></fractal3d>
+    <sin name="sin" type="float"><input name="in" type="float" nodename="noise" /></sin>
+    <mix name="color_mix" type="color3"><input name="fg" type="color3" interfacename="base_color_1" />
+      <input name="bg" type="color3" interfacename="base_color_2" />
+      <input name="mix" type="float" nodename="sin" /></mix>
+    <output name="out" type="color3" nodename="color_mix" />
+  </nodegraph>
+  <standard_surface name="SR_marble1" type="surfaceshader">
+    <input name="base_color" type="color3" nodegraph="NG_marble1" output="out" />
+    <input name="subsurface" type="float" value="0.4" />
+    <input name="subsurface_color" type="color3" nodegraph="NG_marble1" output="out" />
+  </standard_surface>
+  <surfacematerial name="Look" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="SR_marble1" /></surfacematerial>
+</materialx>""",
+    "glass": """<?xml version="1.0"?>
+<materialx version="1.39" colorspace="lin_rec709">
+  <open_pbr_surface name="glass" type="surfaceshader">
+    <input name="transmission_weight" type="float" value="1.0" />
+    <input name="transmission_color" type="color3" value="0.9, 1, 0.95" />
+    <input name="specular_roughness" type="float" value="0" />
+    <input name="geometry_thin_walled" type="boolean" value="false" />
+  </open_pbr_surface>
+  <surfacematerial name="Look" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="glass" /></surfacematerial>
+</materialx>""",
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("brass", ["coat_color: not carried over"]),
+        ("marble", ["noise: is a 'ND_fractal3d_float' node, which is not supported"]),
+        ("glass", ["transmission_color without transmission_depth: not carried over"]),
+    ],
+)
+def test_documents_as_they_are_found(stage, tmp_path, name, said):
+    (tmp_path / "tex").mkdir()
+    write_image(tmp_path / "tex/color.png", np.full((2, 2, 3), 0.5))
+    write_image(tmp_path / "tex/roughness.png", np.full((2, 2, 1), 0.5))
+    text = FOUND[name].removesuffix("</materialx>")
+    model, warned = refer(stage, tmp_path, text, head="")
+    assert len(warned) == len(said), warned
+    for message in said:
+        assert any(message in w for w in warned)
+    assert isinstance(model, fz.StandardMaterial if name == "brass" else fz.IceMaterial)
+    if name == "brass":
+        np.testing.assert_allclose(model.diffuse_color.texture.texels, 0.2158605, rtol=1e-2)
+        assert model.roughness.texture.texels[0, 0, 0] == pytest.approx(128 / 255, rel=1e-4)
+
+
 # -- looks
 
 

@@ -49,6 +49,7 @@ def load_usd(
     subdivision_level: int = 2,
     materials: str | os.PathLike | None = None,
     look: str | None = None,
+    rest_frame: float | None = None,
 ) -> UsdScene:
     """Read a USD stage (.usd, .usda, .usdc, .usdz) as a scene.
 
@@ -69,6 +70,9 @@ def load_usd(
         A MaterialX file whose look takes the place of the stage's own materials on the prims that it names.
     look : str, optional
         The look of that file; by default its first.
+    rest_frame : float, optional
+        Time code at which meshes that deform are in their rest pose, so that points stay on them in all frames; a
+        primvar `rest` or `Pref` of a mesh goes before it.
 
     Returns
     -------
@@ -87,7 +91,7 @@ def load_usd(
     >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
     >>> film = fz.render(scene)  # doctest: +SKIP
     """
-    context, diagnostics = _open(path, frame, purposes, subdivision_level)
+    context, diagnostics = _open(path, frame, purposes, subdivision_level, rest_frame)
     if materials is not None:
         override_materials(context, os.fspath(materials), look)
     scene = UsdScene()
@@ -106,12 +110,14 @@ def load_usd(
     return scene
 
 
-def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tuple[str, Mesh]]:
+def read_meshes(
+    path: str | os.PathLike, frame: float | None = None, rest_frame: float | None = None
+) -> list[tuple[str, Mesh]]:
     """The meshes of a USD stage, instances and all, in world space.
 
     Parameters
     ----------
-    path, frame
+    path, frame, rest_frame
         As in load_usd.
 
     Returns
@@ -124,18 +130,20 @@ def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tup
     OSError
         The file is missing, empty, broken or no USD.
     """
-    context, diagnostics = _open(path, frame, ("default", "render"), 2)
+    context, diagnostics = _open(path, frame, ("default", "render"), 2, rest_frame)
     scene = Scene()
     StageWalker(context, scene).walk()
     _pass_on(context, diagnostics)
     return [(item.path, scene.mesh(item.mesh).transformed(item.matrix)) for item in scene.objects]
 
 
-def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int):
+def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int, rest_frame: float | None = None):
     """The stage at its time, and the delegate that keeps USD's own messages off the terminal."""
     name = os.fspath(path)
     if frame is not None and not math.isfinite(frame):
         raise ValueError(f"{name}: frame must be a finite number, got {frame}.")
+    if rest_frame is not None and not math.isfinite(rest_frame):
+        raise ValueError(f"{name}: rest_frame must be a finite number, got {rest_frame}.")
     if not 0 <= subdivision_level <= 8:
         raise ValueError(f"{name}: subdivision_level must be in 0..8, got {subdivision_level}.")
     wanted = frozenset(purposes)
@@ -161,7 +169,8 @@ def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level:
         time = Usd.TimeCode(stage.GetStartTimeCode())
     else:
         time = Usd.TimeCode.EarliestTime()
-    context = ReadContext(stage, name, time, wanted, subdivision_level)
+    rest_time = None if rest_frame is None else Usd.TimeCode(rest_frame)
+    context = ReadContext(stage, name, time, wanted, subdivision_level, rest_time)
     compose_references(context)
     return context, diagnostics
 

@@ -17,6 +17,11 @@ std::uint64_t edge_key(std::int32_t a, std::int32_t b) {
     return std::uint64_t(std::uint32_t(std::min(a, b))) << 32 | std::uint32_t(std::max(a, b));
 }
 
+// Where a vertex is as cuts see it: in the rest pose, where there is one, so that all poses are cut alike.
+const V3f& place(const Mesh& mesh, std::int32_t vertex) {
+    return mesh.rest.empty() ? mesh.positions[vertex] : mesh.rest[vertex];
+}
+
 // One round of cuts; false where nothing was too long.
 class Round {
   public:
@@ -29,7 +34,7 @@ class Round {
         for (const V3i& t : mesh.triangles) {
             for (int k = 0; k < 3; ++k) {
                 const std::int32_t a = t[k], b = t[(k + 1) % 3];
-                if ((mesh.positions[a] - mesh.positions[b]).length2() <= length2_) continue;
+                if ((place(mesh, a) - place(mesh, b)).length2() <= length2_) continue;
                 ++triangles;  // every cut edge of a triangle makes one more of it
                 const auto [at, is_new] = middles_.try_emplace(edge_key(a, b), std::int32_t(vertex_count_));
                 if (is_new) ++vertex_count_;
@@ -51,9 +56,14 @@ class Round {
         grow(old.normals, mesh.normals);
         grow(old.uvs, mesh.uvs);
         grow(old.colors, mesh.colors);
+        mesh.rest = old.rest, mesh.spacing = old.spacing;
+        if (!mesh.rest.empty()) mesh.rest.resize(vertex_count_);
+        if (!mesh.spacing.empty()) mesh.spacing.resize(vertex_count_);
         for (const auto& [key, middle] : middles_) {
             const auto a = std::int32_t(key >> 32), b = std::int32_t(key & 0xffffffffU);
             mesh.positions[middle] = (old.positions[a] + old.positions[b]) * 0.5f;
+            if (!mesh.rest.empty()) mesh.rest[middle] = (mesh.rest[a] + mesh.rest[b]) * 0.5f;
+            if (!mesh.spacing.empty()) mesh.spacing[middle] = (mesh.spacing[a] + mesh.spacing[b]) * 0.5f;
             halve(mesh.normals, a, b, middle);
             halve(mesh.uvs, a, b, middle);
             halve(mesh.colors, a, b, middle);
@@ -124,9 +134,8 @@ class Round {
         const int a = whole, b = (whole + 1) % 3, c = (whole + 2) % 3;
         const int bc = 3 + b, ca = 3 + c;
         add(c, ca, bc);
-        const auto& p = result.mesh.positions;
-        const float to_bc = (p[vertices[a]] - p[vertices[bc]]).length2();
-        const float to_ca = (p[vertices[b]] - p[vertices[ca]]).length2();
+        const float to_bc = (place(result.mesh, vertices[a]) - place(result.mesh, vertices[bc])).length2();
+        const float to_ca = (place(result.mesh, vertices[b]) - place(result.mesh, vertices[ca])).length2();
         if (to_bc <= to_ca) {
             add(a, b, bc), add(a, bc, ca);
         } else {
@@ -144,7 +153,7 @@ float longest_edge(const Mesh& mesh) {
     float longest2 = 0.0f;
     for (const V3i& t : mesh.triangles) {
         for (int k = 0; k < 3; ++k) {
-            longest2 = std::max(longest2, (mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).length2());
+            longest2 = std::max(longest2, (place(mesh, t[k]) - place(mesh, t[(k + 1) % 3])).length2());
         }
     }
     return std::sqrt(longest2);

@@ -1,6 +1,7 @@
 // Triangles cut until no edge is longer than a length: room for displacement.
 // Model: every edge that is too long is halved, in rounds; whether an edge is cut depends on its own length alone, so that
-//   neighbours agree and no cracks open. New vertices lie on the flat triangles; primvars are linear.
+//   neighbours agree and no cracks open: its length in the rest pose, where there is one, so that a deforming mesh keeps
+//   its triangles. New vertices lie on the flat triangles; primvars, rest pose and spacing are linear.
 // Units: those of the mesh.
 // Valid: any mesh; the result has at most `most_triangles`, with longer edges where more would be needed.
 // Not: curved surfaces, which subdivide() makes first.

@@ -35,7 +35,8 @@ struct IceMaterial {
     MaterialInput<float> bump{0.0f, {}};     // height, metres; a texture
     Ramp ramp;
     Compensation compensation;
-    float spacing = 0.0f;  // of the points, metres; 0 = from the mean free path
+    // Of the points, metres; 0 = from the mean free path. A texture is read at the mesh's vertices.
+    MaterialInput<float> spacing{0.0f, {}};
 
     // Whether fracture planes may be seen inside.
     bool has_sheets() const {
