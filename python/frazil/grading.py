@@ -214,7 +214,7 @@ class Lights:
         ]
 
     def _indirect_terms(self, only: str | None = None) -> list[tuple[str, np.ndarray]]:
-        """What changes where ice is seen by way of other lobes, whose components are not told apart: the mean of them."""
+        """What changes where ice is seen by way of other lobes: of their weights, the mean."""
         if not self._changes_translucency or "indirect_translucency" not in self.film:
             return []
         shares = [*self._translucency_shares(), ("translucency", -np.ones(3))]

@@ -89,7 +89,7 @@ def render(aovs=(), bounces=1, samples=4, **changes):
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """An EXR with all that a recipe may ask for; ice is lit by the floor and by ice, and seen in the floor and through ice."""
+    """An EXR with all that a recipe may ask for; ice is lit by floor and ice, and seen in the floor and through ice."""
     path = tmp_path_factory.mktemp("grade") / "in.exr"
     render(aovs=["translucency_ramp", *(f"compensation_{mode}" for mode in MODES)]).save(path, "zip")
     return path
