@@ -156,6 +156,10 @@ def assert_same_translucency(film, recipe, expected):
     assert_same_picture(graded, expected, 4 * (magnitude(film) + magnitude(expected)))
 
 
+def test_a_white_ramp_is_a_new_render(film):
+    assert_same_translucency(film, {"ramp": {"colors": [(1, 1, 1)] * 3}}, render(colors=[(1, 1, 1)] * 3))
+
+
 @pytest.mark.parametrize("preserve", [False, True])
 def test_new_ramp_colours_are_a_new_render(film, preserve):
     expected = render(colors=NEW_COLORS, preserve=preserve)
