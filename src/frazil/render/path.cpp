@@ -80,7 +80,8 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
 
         const V3f wo = -path.ray.direction;
         path.width += path.spread * length;
-        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
+        Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
+        surface.covering.roughness = blurred_roughness(surface.covering.roughness, path.blur);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
@@ -111,7 +112,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
 
         // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
-        const Shader shader(surface, body);
+        const Shader shader(surface, body, path.blur);
         if (const float opacity = shader.opacity(); opacity < 1.0f) {
             Sampler coin = path.sampler;
             coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(path.straight));
@@ -189,6 +190,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     Scattering value = shader.eval(wo, wi);
     if (!(value.pdf > 0.0f)) return false;
     value.scale(Rgb(1.0f / (value.pdf * odds)));
+    path.add_blur(luminance(value.diffuse) > luminance(value.specular) ? kDiffuseBlur : shader.alpha());
     path.scatter(value, surface.object);
     path.receive(surface, surface.geometric_normal, LightUse::surface);
     ++path.scattered;

@@ -70,6 +70,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     path.clear = ice.refraction * bare;
     path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
     path.spread += lobe_spread(refraction_alpha(ice, surface));
+    path.add_blur(refraction_alpha(ice, surface));
     path.leave_from(surface.position, -surface.geometric_normal,
                     on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     return true;
@@ -154,6 +155,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     }
     const int body = interiors_.filling(path.inside);
     path.spread += lobe_spread(alpha);
+    path.add_blur(alpha);
     if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
     return true;
 }

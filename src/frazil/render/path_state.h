@@ -30,6 +30,9 @@ constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
 // How much wider an opaque surface makes the cone that a path stands for, per metre.
 constexpr float kScatteredSpread = 0.05f;
 
+// What a diffuse lobe counts for in Path::blur.
+constexpr float kDiffuseBlur = 0.3f;
+
 inline float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
 }
@@ -83,8 +86,10 @@ struct Path {
 
     InsideOf inside;
     IceCore core;
-    float clear = 1.0f, volume = 0.0f;   // how much of the next piece is seen through, and scattered once
-    float core_share = 1.0f;             // of what is seen through, how much the core leaves out for it
+    float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
+    // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
+    float blur = 0.0f;
     float width = 0.0f, spread = 0.0f;   // of the cone that the path stands for: radius at the ray's origin, per metre
     LpeTracks lpe;                       // of the light path expressions that are asked for
     std::vector<OverlayShare> overlays;  // where the camera sees ice first, if their layers are asked for
@@ -111,6 +116,8 @@ struct Path {
         }
         ++bounce;
     }
+
+    void add_blur(float alpha) { blur = std::min(1.0f, std::sqrt(blur * blur + alpha * alpha)); }
 
     void scale(const Rgb& factor) {
         last.scale(factor);

@@ -200,7 +200,6 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
             }
         }
     }
-    tile.gathers += tile.requests.size();
     gathering.answer(options.gather, tile);
 }
 
