@@ -1,6 +1,7 @@
 """Recipes: what `frazil grade` changes about a picture, from TOML or a dict, checked key by key.
 
-Model: tables `lights`, `components`, `ramp`, `compensation`, `overlays`, `color` and `mattes`; docs/grading.md lists every key.
+Model: tables `lights`, `components`, `ramp`, `compensation`, `overlays`, `color` and `mattes`; docs/grading.md lists
+every key.
 Units: intensities and colours are factors, exposure is in stops, temperature in kelvin.
 Valid: all numbers finite; an unknown key is refused with the nearest that there is.
 Not: whether the picture has the layers: grading.py.

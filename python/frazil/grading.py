@@ -23,8 +23,8 @@ from .warning import FrazilWarning
 
 __all__ = ["Lights", "grade"]
 
-# Layers of what a change of an overlay's opacity changes, and the component that each belongs to. An overlay tints the light
-# that leaves the core and takes from what enters it: the product goes with the square of the change.
+# Layers of what a change of an overlay's opacity changes, and the component that each belongs to. An overlay tints the
+# light that leaves the core and takes from what enters it: the product goes with the square of the change.
 OVERLAY_PARTS = {
     "diffuse": "diffuse",
     "translucency": "translucency",
@@ -325,7 +325,7 @@ class Lights:
                 wanted = _age_weight(row, recipe.age)
                 if rendered == 0.0 and wanted > 0.0:
                     raise ValueError(
-                        f"grade: overlays.age must be below {row['age_begin']:g}, where {name} of {row['material']} "
+                        f"grade: overlays.age must be at most {row['age_begin']:g}, where {name} of {row['material']} "
                         f"begins, got {recipe.age:g}: at the rendered age {row['age']:g} it is not in the picture. "
                         "Render at a greater age."
                     )

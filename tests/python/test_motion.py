@@ -94,7 +94,8 @@ def test_backgrounds_move_with_the_cameras_turn(tmp_path):
     middle = film["motion"][SIZE[1] // 2][background[SIZE[1] // 2]]
     # One degree to the left, so that the picture goes to the right by about focal length times its tangent.
     pixels = np.tan(np.radians(1.0)) * 30 / scene.camera.vertical_aperture * SIZE[1]
-    assert np.all(middle[:, 0] > 0.95 * pixels) and np.all(middle[:, 0] < 1.5 * pixels)
+    assert np.all(middle[:, 0] > 0.95 * pixels)
+    assert np.all(middle[:, 0] < 1.5 * pixels)
     np.testing.assert_allclose(middle[:, 1], 0.0, atol=0.05)
 
 
