@@ -120,7 +120,7 @@ class Lights:
         if not adds_layers and all(np.all(weight == 1.0) for _, weight in terms):
             return self.film["beauty"][:, :, :3].astype(np.float32)
         if self.is_complete:
-            return self._sum(terms)
+            return self._with_overlaps(self._sum(terms))
         # Some components are not in the file: what changes is added to the beauty.
         changes: list[tuple[str, np.ndarray]] = []
         for component in self.components:
@@ -129,7 +129,7 @@ class Lights:
                 changes += [*own, (component, -np.ones(3))]
         changed = self._sum(changes + self._indirect_terms() + self._overlay_terms())
         changed += self.film["beauty"][:, :, :3]
-        return changed
+        return self._with_overlaps(changed)
 
     def terms(self) -> list[tuple[str, np.ndarray]]:
         """The layers that sum to the graded beauty, each with its (3,) weight."""
@@ -156,17 +156,19 @@ class Lights:
                 terms = [(name, self._weight(group, component)), *self._overlay_terms(component, group)]
                 if component == "refraction":
                     terms += self._indirect_terms(only=group)
-                layers[name] = self._sum(terms)
+                layers[name] = self._with_overlaps(self._sum(terms), component, group)
             if component not in layers:
                 terms = self._terms(component) + self._overlay_terms(component)
-                layers[component] = self._sum(terms + (self._indirect_terms() if component == "refraction" else []))
+                terms += self._indirect_terms() if component == "refraction" else []
+                layers[component] = self._with_overlaps(self._sum(terms), component)
         return layers
 
     def _graded_translucency(self) -> dict[str, np.ndarray]:
         names = self._part_names("translucency")
         parts = {}
         for group, name in names.items():
-            parts[name] = self._sum(self._translucency_terms(only=group) + self._overlay_terms("translucency", group))
+            terms = self._translucency_terms(only=group) + self._overlay_terms("translucency", group)
+            parts[name] = self._with_overlaps(self._sum(terms), "translucency", group)
         if len(names) > 1:
             parts["translucency"] = sum(parts.values())
         return parts
@@ -307,6 +309,42 @@ class Lights:
                     if only is None or group == only
                 ]
         return terms
+
+    def _with_overlaps(self, light: np.ndarray, component: str | None = None, only: str | None = None) -> np.ndarray:
+        """The light, and what several overlays that change change together: in place.
+
+        Overlays that lie over one another multiply what they leave of the light from below. Each one's own change is in
+        `_overlay_terms`; the product of what all leave is more or less than their sum.
+        """
+        factors = {name: factor for name, factor in self._overlay_factors().items() if factor != 1.0}
+        if len(factors) < 2:
+            return light
+        for part in (component,) if component else ("translucency", "refraction", "volume"):
+            if part not in ("translucency", "refraction", "volume") or part not in self.film:
+                continue
+            for group, name in self._part_names(part).items():
+                if only is None or group == only:
+                    light += self._overlap(factors, part, name) * self._weight(group, part).astype(np.float32)
+        return light
+
+    def _overlap(self, factors: Mapping[str, float], part: str, layer: str) -> np.ndarray:
+        """By how much the product of the overlays' changes differs from their sum, for one layer."""
+        rendered = self.film[layer].astype(np.float32)
+        is_lit = np.abs(rendered) > 1e-6
+        product, total = np.ones_like(rendered), np.ones_like(rendered)
+        for overlay, factor in factors.items():
+            change = self._change(overlay, part, layer) * np.float32(factor - 1.0)
+            if part == "translucency":
+                change += self._change(overlay, "squared", layer) * np.float32((factor - 1.0) ** 2)
+            relative = np.divide(change, rendered, out=np.zeros_like(change), where=is_lit)
+            product *= np.clip(1.0 + relative, 0.0, 1e3)
+            total += relative
+        return (product - total) * rendered
+
+    def _change(self, overlay: str, part: str, layer: str) -> np.ndarray:
+        """The layer of an overlay's change that belongs to a component's layer; 0 where the picture does not have it."""
+        name = f"overlay_{overlay}_{part}" + layer[len("translucency" if part == "squared" else part) :]
+        return self.film[name].astype(np.float32) if name in self.film else np.zeros((1, 1, 3), np.float32)
 
     def _overlay_factors(self) -> dict[str, float]:
         """By what the opacity of each overlay is multiplied; refused where it would leave 0..1."""
