@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import frazil as fz
-from dual_contouring import contour
+from frazil.formations.contour import contour
 from frazil.image import write_png
 from ice_looks import Block, frame, lifted, set_scene, to_mesh
 from scenery import Rock

@@ -344,7 +344,7 @@ class Lights:
     def _change(self, overlay: str, part: str, layer: str) -> np.ndarray:
         """The layer of an overlay's change that belongs to a component's layer; 0 where the picture does not have it."""
         name = f"overlay_{overlay}_{part}" + layer[len("translucency" if part == "squared" else part) :]
-        return self.film[name].astype(np.float32) if name in self.film else np.zeros((1, 1, 3), np.float32)
+        return self.film[name].astype(np.float32) if name in self.film else np.zeros_like(self.film[layer], np.float32)
 
     def _overlay_factors(self) -> dict[str, float]:
         """By what the opacity of each overlay is multiplied; refused where it would leave 0..1."""

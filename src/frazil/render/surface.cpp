@@ -139,9 +139,12 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
 
     // The place from barycentrics: as exact as the vertices, unlike origin + t * direction.
     const V3i& triangle = mesh.triangles[hit.triangle];
-    const V3f local = mesh.positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) +
-                      mesh.positions[triangle.y] * hit.uv.x + mesh.positions[triangle.z] * hit.uv.y;
-    surface.local_position = local;
+    const auto at_hit = [&](const std::vector<V3f>& positions) {
+        return positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) + positions[triangle.y] * hit.uv.x +
+               positions[triangle.z] * hit.uv.y;
+    };
+    const V3f local = at_hit(mesh.positions);
+    surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest);
     surface.position = local * object.local_to_world;
 
     const V3f wo = -direction;

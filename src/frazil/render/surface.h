@@ -21,7 +21,7 @@ struct Surface {
     V3f geometric_normal = V3f(0.0f);  // unit length, on the viewer's side
     V3f normal = V3f(0.0f);            // for shading, unit length, the viewer above it
     V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
-    V3f local_position = V3f(0.0f);    // in the mesh's own space
+    V3f local_position = V3f(0.0f);    // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
     Covering covering;   // of ice: its overlays, with the roughness that they leave
     PatternPoint place;  // where those read their patterns
