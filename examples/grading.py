@@ -1,6 +1,6 @@
 """Pictures of grading and layers: one render of a block of ice, and what is made of it without another ray.
 
-    python examples/grading.py [-o out/grading] [--size 240] [--samples 48]
+    python examples/grading.py [-o out/grading] [--size 180] [--samples 48]
 
 Writes `block.exr` with all layers; `grading.png`, one recipe a tile; `layers.png`, one layer a tile. The tiles' names
 are printed in the order in which they lie.
@@ -76,7 +76,7 @@ def tiles(pictures: list[np.ndarray], columns: int) -> np.ndarray:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("out/grading"), help="the folder to write into")
-    parser.add_argument("--size", type=int, default=240, help="pixels along a side of one picture")
+    parser.add_argument("--size", type=int, default=180, help="pixels along a side of one picture")
     parser.add_argument("--samples", type=int, default=48, help="per pixel")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)

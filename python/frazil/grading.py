@@ -342,7 +342,7 @@ class Lights:
         return (product - total) * rendered
 
     def _change(self, overlay: str, part: str, layer: str) -> np.ndarray:
-        """The layer of an overlay's change that belongs to a component's layer; 0 where the picture does not have it."""
+        """The change by an overlay that belongs to a component's layer; 0 where the picture lacks it."""
         name = f"overlay_{overlay}_{part}" + layer[len("translucency" if part == "squared" else part) :]
         return self.film[name].astype(np.float32) if name in self.film else np.zeros_like(self.film[layer], np.float32)
 
