@@ -197,7 +197,7 @@ class MaterialReader:
                     f"{values['age_begin']:g} is used.",
                 )
                 values["age_end"] = values["age_begin"]
-            overlays.append(Overlay(**values))
+            overlays.append(Overlay(**values, name=name.removeprefix(_OVERLAY_PREFIX)))
             if "mask" in read.expressions:
                 masks.append(read.expressions["mask"])
         return overlays, masks

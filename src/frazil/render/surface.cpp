@@ -128,10 +128,28 @@ Covering SurfaceResolver::covering(const IceMaterial& ice, const TexturePoint& a
     return eval_overlays(ice.overlays, ice.age, roughness, point, at, with_bump);
 }
 
-std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSet& points) const {
-    const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
-    if (!ice || ice->overlays.empty()) return {};
-    std::vector<float> result(points.size());
+std::vector<CoveringSlope> SurfaceResolver::slopes(const Surface& surface) const {
+    const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
+    return ice ? covering_slopes(ice->overlays, ice->age, surface.place, surface.texture_point)
+               : std::vector<CoveringSlope>();
+}
+
+std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, const PointSet& points) const {
+    const auto& ice = std::get<IceMaterial>(scene_.materials[scene_.objects[object].material].model);
+    const std::size_t overlays = ice.overlays.size();
+    std::vector<float> result(points.size() * overlays);
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
+        const std::vector<CoveringSlope> slopes = covering_slopes(ice.overlays, ice.age, at, texture_at);
+        const float scattered = eval_overlays(ice.overlays, ice.age, 0.0f, at, texture_at, false).scattered;
+        for (std::size_t o = 0; o < overlays; ++o) {
+            result[k * overlays + o] = scattered < 1.0f ? slopes[o].scattered / (1.0f - scattered) : 0.0f;
+        }
+    });
+    return result;
+}
+
+template <class Visit>
+void SurfaceResolver::for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const {
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto triangle = static_cast<std::uint32_t>(points.triangles[k]);
@@ -141,8 +159,17 @@ std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSe
             const float footprint = std::sqrt(points.areas[k] * kInvPi);
             std::tie(at.long_axis, at.short_axis) = tangent_frame(at.normal);
             at.long_axis *= footprint, at.short_axis *= footprint;
-            result[k] = 1.0f - covering(*ice, at, footprint, false).scattered;
+            visit(k, PatternPoint{at.position, at.normal, footprint}, at);
         }
+    });
+}
+
+std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSet& points) const {
+    const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
+    if (!ice || ice->overlays.empty()) return {};
+    std::vector<float> result(points.size());
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
+        result[k] = 1.0f - eval_overlays(ice->overlays, ice->age, 0.0f, at, texture_at, false).scattered;
     });
     return result;
 }
@@ -156,9 +183,12 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
 
     // The place from barycentrics: as exact as the vertices, unlike origin + t * direction.
     const V3i& triangle = mesh.triangles[hit.triangle];
-    const V3f local = mesh.positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) +
-                      mesh.positions[triangle.y] * hit.uv.x + mesh.positions[triangle.z] * hit.uv.y;
-    surface.local_position = local;
+    const auto at_hit = [&](const std::vector<V3f>& positions) {
+        return positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) + positions[triangle.y] * hit.uv.x +
+               positions[triangle.z] * hit.uv.y;
+    };
+    const V3f local = at_hit(mesh.positions);
+    surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest);
     surface.position = surface.lifted = local * object.local_to_world;
 
     const V3f wo = -direction;
@@ -211,6 +241,7 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
         mapped = ice ? mapped_normal(ice->normal, ice->bump, at) : mapped_normal(standard->normal, standard->bump, at);
     }
     if (ice) {
+        surface.place = {at.position, at.normal, footprint};
         surface.covering = covering(*ice, at, footprint, with_bump);
         const V3f& slope = surface.covering.slope;
         if (slope != V3f(0.0f)) mapped = (mapped - (slope - mapped * mapped.dot(slope))).normalized();

@@ -26,9 +26,10 @@ struct Surface {
     V3f lifted = V3f(0.0f);            // where rays leave on the viewer's side
     V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
     TexturePoint texture_point;        // where textures are read; st alone for materials that read none
-    V3f local_position = V3f(0.0f);    // in the mesh's own space
+    V3f local_position = V3f(0.0f);    // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
-    Covering covering;  // of ice: its overlays, with the roughness that they leave
+    Covering covering;   // of ice: its overlays, with the roughness that they leave
+    PatternPoint place;  // where those read their patterns
 };
 
 // Resolves hits into surfaces; holds what that needs per object.
@@ -43,6 +44,11 @@ class SurfaceResolver {
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
     std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
 
+    // How the covering of a surface of ice changes with each overlay's opacity.
+    std::vector<CoveringSlope> slopes(const Surface& surface) const;
+    // Which part of the light that enters each point an overlay takes, more by the logarithm of its opacity: (N, overlays).
+    std::vector<float> taken_by_overlays(std::uint32_t object, const PointSet& points) const;
+
     // World space to the object's rest space and back: rigid, perhaps mirrored.
     const M44f& world_to_rest(std::uint32_t object) const { return frames_[object].world_to_rest; }
     const M44f& rest_to_world(std::uint32_t object) const { return frames_[object].rest_to_world; }
@@ -55,6 +61,8 @@ class SurfaceResolver {
     // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
     TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,
                                const V3f& normal) const;
+    template <class Visit>
+    void for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const;
 
     const Scene& scene_;
     std::vector<Frames> frames_;
