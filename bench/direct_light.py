@@ -50,7 +50,7 @@ def surfaces() -> list[tuple[np.ndarray, np.ndarray]]:
     return [(floor, quad), (wall, quad), ball((0.3, 0.6, 0.0), 0.6)]
 
 
-def sky(width: int = 128) -> np.ndarray:
+def sky(width: int = 512) -> np.ndarray:
     y, x = np.mgrid[: width // 2, :width]
     up, around = np.cos(np.pi * (y + 0.5) / (width // 2)), 2 * np.pi * (x + 0.5) / width
     image = np.full((width // 2, width, 3), 0.1)

@@ -62,7 +62,7 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
 def main(path: str = "light_targets.png") -> None:
     pictures = []
     for chosen in (ALL, *({name: 1.0} for name in ("translucency", "specular", "diffuse")), {}):
-        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=256)
+        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=64)
         pictures.append(film["beauty"][:, :, :3])
     write_png(path, np.concatenate(pictures, axis=1))
 

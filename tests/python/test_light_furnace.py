@@ -150,9 +150,9 @@ def test_twins_in_a_crowd_cancel_within_noise():
 
 def corner_factor(a: float, b: float, c: float) -> float:
     x, y = a / c, b / c
-    return (
-        x / np.hypot(1, x) * np.arctan(y / np.hypot(1, x)) + y / np.hypot(1, y) * np.arctan(x / np.hypot(1, y))
-    ) / (2 * np.pi)
+    return (x / np.hypot(1, x) * np.arctan(y / np.hypot(1, x)) + y / np.hypot(1, y) * np.arctan(x / np.hypot(1, y))) / (
+        2 * np.pi
+    )
 
 
 def quad(half: float, height: float) -> fz.Mesh:

@@ -44,9 +44,7 @@ class Raster {
     const std::vector<V3f>& directions() const { return directions_; }  // local, the normal is z
 
     // The solid angle of a cell in a direction of this cosine.
-    static float solid_angle(float cosine) {
-        return (2.0f / kSize) * (2.0f / kSize) / std::max(cosine, 1.0f / kSize);
-    }
+    static float solid_angle(float cosine) { return (2.0f / kSize) * (2.0f / kSize) / std::max(cosine, 1.0f / kSize); }
     // Hide a part of a cell's size about a direction: shared out to the four cells whose middles are nearest.
     void hide_part(const V3f& direction, float part, std::vector<float>& hidden) const {
         const float x = (direction.x + 1.0f) * (0.5f * kSize) - 0.5f, y = (direction.y + 1.0f) * (0.5f * kSize) - 0.5f;
