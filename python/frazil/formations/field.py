@@ -1,8 +1,8 @@
 """A field of formations: a few prototypes, placed hundreds of times as native USD instances on snow.
 
 Model: each prototype is one formation's ice, made once; instances are turned, scaled and strewn so that none stand
-    closer than their size (darts, dense in bands as ice gathers). Meshes are shared between instances; light is baked for each
-    instance, since it differs where one stands in another's shadow (docs/formations.md).
+    closer than their size (darts, dense in bands as ice gathers). Meshes are shared between instances; light is baked
+    for each, since it differs where one stands in another's shadow (docs/formations.md).
 Units: metres, y up.
 Not: animation; rocks on every instance.
 """
