@@ -30,6 +30,11 @@ def render_command(
     camera: Annotated[
         str | None, typer.Option(metavar="PATH", help="Prim path of the camera. Default: the stage's own, else a view.")
     ] = None,
+    materials: Annotated[
+        Path | None,
+        typer.Option(metavar="LOOKS.mtlx", help="A MaterialX file whose look replaces the stage's materials."),
+    ] = None,
+    look: Annotated[str | None, typer.Option(metavar="NAME", help="Of --materials; by default its first.")] = None,
     resolution: Annotated[
         str | None,
         typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),
@@ -165,7 +170,7 @@ def render_command(
 
     from ..aovs import layers_of
     from ..rendering import render as render_scene
-    from ..usd import load_usd
+    from ..usd import add_motion, load_usd
 
     options: dict[str, Any] = {
         "samples": samples,
@@ -190,12 +195,16 @@ def render_command(
     with make_progress("none" if quiet and progress == "bar" else progress, len(jobs)) as reporter:
         for time_code, exr, preview in jobs:
             start = time.perf_counter()
-            loaded = load_usd(scene, frame=time_code, camera=camera, rest_frame=rest_frame)
+            loaded = load_usd(
+                scene, frame=time_code, camera=camera, rest_frame=rest_frame, materials=materials, look=look
+            )
             seconds_load = time.perf_counter() - start
             reporter("load", 1.0)
 
             chosen = layers or _authored_layers(loaded)
             options["aovs"] = chosen or ()
+            if chosen and "motion" in chosen:
+                add_motion(loaded)
             options["lpes"] = expressions | _authored_lpes(loaded)
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
 from pxr import Tf, Usd, UsdUtils
 
 from .._frazil import Mesh, Scene
+from ..warning import FrazilWarning
 from .camera import choose_camera
 from .context import ReadContext
 from .instancing import StageWalker
 from .lights import add_grey_dome
+from .mtlx import compose_references, override_materials
 from .settings import RenderSettings, read_render_settings
 
 
@@ -46,6 +49,8 @@ def load_usd(
     *,
     purposes: Iterable[str] = ("default", "render"),
     subdivision_level: int = 2,
+    materials: str | os.PathLike | None = None,
+    look: str | None = None,
     rest_frame: float | None = None,
 ) -> UsdScene:
     """Read a USD stage (.usd, .usda, .usdc, .usdz) as a scene.
@@ -63,6 +68,10 @@ def load_usd(
         Which purposes are rendered, of 'default', 'render', 'proxy' and 'guide'.
     subdivision_level : int
         How often each edge of a Catmull-Clark mesh is halved, >= 0; dense meshes are halved less often.
+    materials : str or path, optional
+        A MaterialX file whose look takes the place of the stage's own materials on the prims that it names.
+    look : str, optional
+        The look of that file; by default its first.
     rest_frame : float, optional
         Time code at which meshes that deform are in their rest pose, so that points stay on them in all frames; a
         primvar `rest` or `Pref` of a mesh goes before it.
@@ -77,7 +86,7 @@ def load_usd(
     OSError
         The file is missing, empty, broken or no USD.
     ValueError
-        The camera does not exist, or an option is out of range.
+        The camera or the look does not exist, or an option is out of range.
 
     Examples
     --------
@@ -85,6 +94,8 @@ def load_usd(
     >>> film = fz.render(scene)  # doctest: +SKIP
     """
     context, diagnostics = _open(path, frame, purposes, subdivision_level, rest_frame)
+    if materials is not None:
+        override_materials(context, os.fspath(materials), look)
     scene = UsdScene()
     StageWalker(context, scene).walk()
     if not scene.objects:
@@ -97,8 +108,44 @@ def load_usd(
     scene.file = context.file
     scene.frame = None if context.time.IsDefault() or context.time.IsEarliestTime() else context.time.GetValue()
     scene.render_settings = settings
+    scene.reading = (frozenset(purposes), subdivision_level, rest_frame)
     scene.warnings = context.warnings
     return scene
+
+
+def add_motion(scene: UsdScene, frames: float = 1.0) -> None:
+    """Tell a scene how it goes on, so that the layer ``motion`` can be rendered.
+
+    Parameters
+    ----------
+    scene : UsdScene
+        From load_usd.
+    frames : float
+        How far ahead the place is that motion vectors point to.
+
+    Raises
+    ------
+    OSError
+        The stage is no longer there.
+
+    Examples
+    --------
+    >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
+    >>> fz.add_motion(scene)  # doctest: +SKIP
+    >>> motion = fz.render(scene, aovs=["motion"])["motion"]  # doctest: +SKIP
+    """
+    if scene.frame is None:  # no time: all stands still
+        scene.set_motion(scene)
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrazilWarning)  # said when the scene was read
+        context, diagnostics = _open(scene.file, scene.frame + frames, *scene.reading)
+        later = Scene()
+        StageWalker(context, later).walk()
+        prim = context.stage.GetPrimAtPath(scene.camera.path) if scene.camera.path.startswith("/") else None
+        later.camera = choose_camera(context, later, scene.camera.path, None) if prim else scene.camera
+        diagnostics.TakeUncoalescedDiagnostics()
+    scene.set_motion(later)
 
 
 def read_meshes(
@@ -161,7 +208,9 @@ def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level:
     else:
         time = Usd.TimeCode.EarliestTime()
     rest_time = None if rest_frame is None else Usd.TimeCode(rest_frame)
-    return ReadContext(stage, name, time, wanted, subdivision_level, rest_time), diagnostics
+    context = ReadContext(stage, name, time, wanted, subdivision_level, rest_time)
+    compose_references(context)
+    return context, diagnostics
 
 
 def _first_line(error: Tf.ErrorException) -> str:
@@ -176,6 +225,8 @@ def _pass_on(context: ReadContext, diagnostics: UsdUtils.CoalescingDiagnosticDel
     for diagnostic in diagnostics.TakeUncoalescedDiagnostics():
         text = " ".join(diagnostic.commentary.split())
         text = re.sub(r"\s*\((re)?composing stage.*\)$|\s*\(instantiating stage.*\)$", "", text)
+        if ".mtlx" in text and "format" in text:
+            continue  # compose_references has read it, or has said why not
         about = re.match(r"In <([^>]+)>: (.*)", text)
         if about:
             context.warn(about[1], about[2])

@@ -9,6 +9,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "frazil/material/pattern.h"
 #include "frazil/material/texture.h"
@@ -16,6 +17,7 @@
 namespace frazil {
 
 struct Overlay {
+    std::string name;                    // of its layers in a picture; empty = its number in the material, from 1
     Rgb color = Rgb(0.9f, 0.95f, 1.0f);  // of what is scattered, 0..1
     float opacity = 1.0f;                // where the mask is 1
     float roughness = 0.5f;              // of the surface there
@@ -36,16 +38,26 @@ float age_weight(const Overlay& overlay, float age);
 
 // What the overlays make of a place on the surface.
 struct Covering {
-    float covered = 0.0f;         // of what would be seen through the surface
-    float scattered = 0.0f;       // of the light that would enter
-    Rgb reflectance = Rgb(0.0f);  // diffuse, scattered times colour
-    Rgb tint = Rgb(1.0f);         // of what leaves the body
-    float roughness = 0.0f;
-    V3f slope = V3f(0.0f);  // gradient of height in rest space
+    float covered = 0.0f;                           // of what would be seen through the surface
+    float scattered = 0.0f;                         // of the light that would enter
+    Rgb reflectance = Rgb(0.0f);                    // diffuse, scattered times colour
+    Rgb tint = Rgb(1.0f);                           // of what leaves the body
+    float roughness = 0.0f, bare_roughness = 0.0f;  // with the overlays, and without
+    V3f slope = V3f(0.0f);                          // gradient of height in rest space
 };
 
 // `roughness` is the bare surface's. The slope is left 0 unless `with_slope`.
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const V2f& st, bool with_slope);
+                       const TexturePoint& at, bool with_slope);
+
+// How a covering changes with one overlay's opacity: derivatives by its logarithm.
+struct CoveringSlope {
+    float covered = 0.0f, scattered = 0.0f;
+    Rgb reflectance = Rgb(0.0f), tint = Rgb(0.0f);
+};
+
+// One for each overlay.
+std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
+                                           const TexturePoint& at);
 
 }  // namespace frazil

@@ -23,7 +23,7 @@ V3f on_side(const V3f& direction, const V3f& normal, float sign) {
 float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
     const float roughness = surface.covering.roughness;
     if (ice.refraction_roughness < 0.0f) return alpha_from_roughness(roughness);
-    const float bare = eval_float(ice.roughness, surface.st);
+    const float bare = surface.covering.bare_roughness;
     return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
 }
 
@@ -184,6 +184,11 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
         if (state == LpeAutomaton::kDead) continue;
         request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
+    }
+    for (const OverlayShare& overlay : path.overlays) {
+        const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
+        const Rgb of_core = core.is_entered ? change_of_core(overlay, share) : overlay.core;
+        request.overlays.push_back({plane, overlay.overlay, overlay.diffuse, of_core, overlay.seen_through});
     }
     tile.requests.push_back(std::move(request));
 }
