@@ -59,9 +59,11 @@ _LAZY = {
     "Recipe": ".grade_recipe",
     "ice_preset": ".ice",
     "UsdScene": ".usd",
+    "formations": ".formations",
     "grade": ".grading",
     "bake": ".baking",
     "load_bake": ".baking",
+    "add_motion": ".usd",
     "load_usd": ".usd",
     "match": ".matching",
     "poisson_points": ".points",
@@ -113,6 +115,7 @@ __all__ = [
     "bake",
     "bake_irradiance",
     "bake_occlusion",
+    "formations",
     "fresnel_average",
     "fresnel_dielectric",
     "grade",
@@ -120,6 +123,7 @@ __all__ = [
     "ice_preset",
     "light_groups",
     "load_bake",
+    "add_motion",
     "load_usd",
     "point_occlusion",
     "match",
@@ -136,7 +140,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
-        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        module = importlib.import_module(_LAZY[name], __name__)
+        value = module if _LAZY[name] == f".{name}" else getattr(module, name)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'frazil' has no attribute {name!r}")

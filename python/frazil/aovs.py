@@ -68,6 +68,8 @@ def layers_of(names: Iterable[str], film: Mapping[str, Any]) -> list[str]:
             own_name = f"(?:indirect_)?{own_name}|indirect_translucency"
         if name in ("matte", "refracted_matte"):
             own_name += r"(?:\.\w+)?"
+        if name == "overlay":
+            own_name = r"overlay_\w+"
         pattern = re.compile(rf"(?:{own_name})\d*({'|'.join(map(re.escape, tails))})")
         own = [layer for layer in film if pattern.fullmatch(layer)]
         if not own:
