@@ -1,7 +1,7 @@
 """Mattes: named sets of objects, and how much of each pixel shows them, directly and through ice.
 
-Model: a set holds every object at or below one of its paths; sets may overlap. The core makes a layer ``matte.NAME`` and
-one ``refracted_matte.NAME`` of each (docs/aovs.md).
+Model: a set holds every object at or below one of its paths; sets may overlap. The core makes layers ``matte.NAME`` and
+``refracted_matte.NAME`` of each (docs/aovs.md).
 Not: ids of single objects (cryptomatte.py).
 """
 

@@ -27,7 +27,8 @@ def test_collections_and_paths_name_sets_which_may_overlap(stage):
     film = fz.render(scene, resolution=(16, 16), samples=4, mattes={"all": ["/World"], "b": ["/World/B/x", "/World/B"]})
     mattes = {name: film[f"matte.{name}"][..., 0] for name in ("left", "all", "b")}
     assert np.allclose(mattes["all"], film["beauty"][..., 3], atol=1e-6)
-    assert mattes["left"].sum() > 1 and mattes["b"].sum() > 1
+    assert mattes["left"].sum() > 1
+    assert mattes["b"].sum() > 1
     assert (mattes["left"] + mattes["b"]).max() == pytest.approx(2.0)  # the square that both have
     assert not film["refracted_matte.all"].any()
     assert film.metadata["frazil:mattes"]["b"] == ["/World/B/x", "/World/B/y"]
