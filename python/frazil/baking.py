@@ -45,6 +45,8 @@ BAKE_OPTIONS = (
     "tolerance",
     "estimator",
 )
+# Properties of ice that change what is seen of it, not what bounces.
+_ONLY_SEEN = ("ramp_", "compensation")
 
 
 @dataclass
@@ -197,7 +199,7 @@ def _hashes(scene: Any, options: dict[str, Any]) -> dict[str, Any]:
     """What the parts of a bake were made of: one text for the points, one per light group."""
     defaults = _frazil.RenderOptions()
     chosen = {name: options.get(name, getattr(defaults, name)) for name in BAKE_OPTIONS}
-    shapes = scene_hash(scene)
+    shapes = scene_hash(scene, _ONLY_SEEN)
     groups = {
         group: content_hash(shapes, chosen, [light for light in scene.lights if light.group == group])
         for group in _frazil.light_groups(scene.lights)

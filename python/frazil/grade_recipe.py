@@ -36,7 +36,7 @@ __all__ = [
     "recipe_text",
 ]
 
-MODES = ("off", "ratio", "conserve", "fill", "linear")
+MODES = ("off", "ratio", "conserve", "depth", "fill", "linear")
 
 
 @dataclass(frozen=True)

@@ -110,32 +110,44 @@ class Lights:
         if self.is_complete:
             return self._sum(terms)
         # Some components are not in the file: what changes is added to the beauty.
-        changed = self._sum([(name, weight - 1.0) for name, weight in terms if np.any(weight != 1.0)])
+        changes: list[tuple[str, np.ndarray]] = []
+        for component in self.components:
+            own = self._terms_of(component)
+            if any(np.any(weight != 1.0) for _, weight in own):
+                changes += [*own, (component, -np.ones(3))]
+        changed = self._sum(changes + self._indirect_terms())
         changed += self.film["beauty"][:, :, :3]
         return changed
 
     def terms(self) -> list[tuple[str, np.ndarray]]:
         """The layers that sum to the graded beauty, each with its (3,) weight."""
-        terms: list[tuple[str, np.ndarray]] = []
-        for component in self.components:
-            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
-                terms += self._translucency_terms()
-            else:
-                terms += self._terms(component)
-        return terms
+        terms = [term for component in self.components for term in self._terms_of(component)]
+        return terms + self._indirect_terms()
+
+    def _terms_of(self, component: str) -> list[tuple[str, np.ndarray]]:
+        if component == "translucency" and self._changes_translucency:
+            return self._translucency_terms()
+        return self._terms(component)
+
+    @property
+    def _changes_translucency(self) -> bool:
+        return bool(self.recipe.ramp or self.recipe.compensation)
 
     def graded_layers(self) -> dict[str, np.ndarray]:
-        """Every additive layer and plane of translucency, graded."""
+        """Every additive layer, graded. What changes of ice that is seen by way of other lobes is in `refraction`."""
         layers = {}
         for component in self.components:
-            terms = self._terms(component)
-            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
+            if component == "translucency" and self._changes_translucency:
                 layers |= self._graded_translucency()
                 continue
-            layers[component] = self._sum(terms)
-            layers |= {
-                name: self._sum([(name, weight)]) for name, weight in self._parts(component) if name != component
-            }
+            for group, name in self._part_names(component).items():
+                terms = [(name, self._weight(group, component))]
+                if component == "refraction":
+                    terms += self._indirect_terms(only=group)
+                layers[name] = self._sum(terms)
+            if component not in layers:
+                terms = self._terms(component)
+                layers[component] = self._sum(terms + (self._indirect_terms() if component == "refraction" else []))
         return layers
 
     def _graded_translucency(self) -> dict[str, np.ndarray]:
@@ -194,13 +206,28 @@ class Lights:
                 "grade: ramp and compensation must not be changed in one recipe: their product is not in the layers. "
                 "Render with the new compensation."
             )
-        shares = self._ramp_shares() if self.recipe.ramp else self._compensation_shares()
         return [
             (name, self._weight(group, "translucency") * share)
-            for layer, share in shares
+            for layer, share in self._translucency_shares()
             for group, name in self._part_names(layer).items()
             if only is None or group == only
         ]
+
+    def _indirect_terms(self, only: str | None = None) -> list[tuple[str, np.ndarray]]:
+        """What changes where ice is seen by way of other lobes, whose components are not told apart: the mean of them."""
+        if not self._changes_translucency or "indirect_translucency" not in self.film:
+            return []
+        shares = [*self._translucency_shares(), ("translucency", -np.ones(3))]
+        lobes = ("diffuse", "specular", "refraction")
+        return [
+            (name, np.mean([self._weight(group, lobe) for lobe in lobes], axis=0) * share)
+            for layer, share in shares
+            for group, name in self._part_names(f"indirect_{layer}").items()
+            if only is None or group == only
+        ]
+
+    def _translucency_shares(self) -> list[tuple[str, np.ndarray]]:
+        return self._ramp_shares() if self.recipe.ramp else self._compensation_shares()
 
     def _ramp_shares(self) -> list[tuple[str, np.ndarray]]:
         """Every knot layer and the colour that it gets."""
@@ -258,6 +285,7 @@ class Lights:
         tops = set(self.components)
         tops |= {f"translucency_ramp{k}" for k in range(len(self.knots))}
         tops |= {f"compensation_{mode}" for mode in MODES}
+        tops |= {f"indirect_{top}" for top in tops}
         names = tops | {f"{top}_{group}" for top in tops for group in self.groups}
         return {name for name in names if name in self.film}
 

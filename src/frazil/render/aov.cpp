@@ -59,6 +59,7 @@ constexpr std::array kTable = {
     Aov{"compensation_ratio", "RGB", "translucency with compensation ratio at strength 1", average, false, true, false},
     Aov{"compensation_conserve", "RGB", "translucency with compensation conserve at strength 1", average, false, true,
         false},
+    Aov{"compensation_depth", "RGB", "translucency with compensation depth at strength 1", average, false, true, false},
     Aov{"compensation_fill", "RGB", "translucency with compensation fill at strength 1", average, false, true, false},
     Aov{"compensation_linear", "RGB", "translucency with compensation linear at strength 1", average, false, true,
         false},

@@ -69,7 +69,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
 
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
                                                      const RayScene& ray_scene) {
-    if (body.material->compensation.mode != CompensationMode::depth || points.size() == 0) return nullptr;
+    if (points.size() == 0) return nullptr;
     return std::make_unique<const PointTree>(
         points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once), 1, body.profile);
 }
@@ -89,19 +89,22 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
 }
 
 Rgb Body::gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const {
-    const Rgb area = compensation_gain(compensation, coverage, total_reflectance);
-    return thin ? area * (Rgb(1.0f) + (*thin - Rgb(1.0f)) * compensation.strength) : area;
+    if (!thin) return compensation_gain(compensation, coverage, total_reflectance);
+    Compensation full = compensation;
+    full.strength = 1.0f;
+    const Rgb gain = compensation_gain(full, coverage, total_reflectance) * *thin;
+    return Rgb(1.0f) + (gain - Rgb(1.0f)) * compensation.strength;
 }
 
-void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
-    const Compensation& compensation = body.material->compensation;
+void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
+    const Compensation compensation;
     for (std::size_t i = 0; i < gathered.coverage.size(); ++i) {
         const Rgb gain = body.gain(compensation, gathered.coverage[i], gains.empty() ? nullptr : &gains[i]);
         for (std::size_t g = 0; g < gathered.groups; ++g) gathered.exitance[i * gathered.groups + g] *= gain;
     }
 }
 
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene, bool wants_depth,
                  std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -109,7 +112,9 @@ void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const Ra
         const Body& body = *bodies[i];
         bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
                                                             body.material->ramp);
-        bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
+        if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
+            bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
+        }
         bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();

@@ -49,14 +49,15 @@ struct LitPoints {
     std::vector<Rgb> irradiance;  // (N, groups)
 };
 
-// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where the compensation has no use for it.
+// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
                                                      const RayScene& ray_scene);
 // The mean gain around each position, from such a tree; empty without one.
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options);
-// Scale the exitance that was gathered as the body's material asks for; `gains` as above.
-void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
+// Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
+// seen. So bounces keep energy, and a picture's compensation can be changed exactly after its render. `gains` as above.
+void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
 // What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
 // absorbs; others nothing.
 std::vector<Passage> passages_of(const Scene& scene);
@@ -64,8 +65,9 @@ std::vector<Passage> passages_of(const Scene& scene);
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
-// Give every body the tree of its points, (N, groups) of light each. Fills points, nodes and seconds of the stats.
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+// Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
+// use for it or a layer `wants_depth`. Fills points, nodes and seconds of the stats.
+void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene, bool wants_depth,
                  std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -21,9 +21,10 @@ struct Exitance {
 
 Exitance exitance_of(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
                      const std::vector<Rgb>& gains, const GatherOptions& options) {
-    const PointTree tree(points, irradiance, groups, body.profile, body.material->ramp);
+    // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
+    const PointTree tree(points, irradiance, groups, body.profile);
     Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
-    compensate(body, gains, gathered);
+    compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
     return {std::move(gathered.exitance), std::make_unique<const PointLookup>(points)};

@@ -14,11 +14,13 @@ struct ModeName {
     CompensationMode mode;
     const char* aov;
 };
-constexpr ModeName kModes[] = {{CompensationMode::off, "compensation_off"},
-                               {CompensationMode::ratio, "compensation_ratio"},
-                               {CompensationMode::conserve, "compensation_conserve"},
-                               {CompensationMode::fill, "compensation_fill"},
-                               {CompensationMode::linear, "compensation_linear"}};
+constexpr ModeName kModes[] = {
+    {CompensationMode::off, "compensation_off"},           {CompensationMode::ratio, "compensation_ratio"},
+    {CompensationMode::conserve, "compensation_conserve"}, {CompensationMode::depth, "compensation_depth"},
+    {CompensationMode::fill, "compensation_fill"},         {CompensationMode::linear, "compensation_linear"}};
+
+// Names of planes of ice that is seen by way of another lobe begin like this.
+constexpr const char* kIndirect = "indirect_";
 
 // Does the object emit light that belongs to no light?
 bool emits(const Scene& scene, std::size_t object) {
@@ -83,6 +85,9 @@ void add_lpes(const Scene& scene, std::span<const NamedLpe> lpes, FilmLayout& la
         const bool is_plain = !name.empty() && std::all_of(name.begin(), name.end(),
                                                            [](unsigned char c) { return std::isalnum(c) || c == '_'; });
         if (!is_plain) throw ValueError(str("lpe: name must be of letters, digits and _, got '", name, "'."));
+        if (name.rfind(kIndirect, 0) == 0) {
+            throw ValueError(str("lpe ", name, ": name must not begin with ", kIndirect, ". Choose another."));
+        }
         for (const Aov& aov : aov_table()) {
             if (name == aov.name || name.rfind(str(aov.name, "_"), 0) == 0) {
                 throw ValueError(str("lpe ", name, ": name must not be, or begin like, that of the AOV ", aov.name,
@@ -125,14 +130,18 @@ bool FilmLayout::has(std::string_view aov) const {
     return std::find(aovs.begin(), aovs.end(), aov) != aovs.end();
 }
 
-bool FilmLayout::needs_fill() const {
-    return std::find(modes.begin(), modes.end(), CompensationMode::fill) != modes.end();
+bool FilmLayout::has_mode(CompensationMode mode) const {
+    return std::find(modes.begin(), modes.end(), mode) != modes.end();
 }
 
 std::string FilmLayout::plane_name(std::size_t plane) const {
-    if (plane < knots.size()) return str("translucency_ramp", plane);
+    const bool is_indirect = plane >= seen_plane_count();
+    if (is_indirect) plane -= seen_plane_count();
+    if (plane == seen_plane_count()) return str(kIndirect, "translucency");
+    const std::string prefix = is_indirect ? kIndirect : "";
+    if (plane < knots.size()) return str(prefix, "translucency_ramp", plane);
     for (const ModeName& named : kModes) {
-        if (named.mode == modes[plane - knots.size()]) return named.aov;
+        if (named.mode == modes[plane - knots.size()]) return prefix + named.aov;
     }
     return {};
 }

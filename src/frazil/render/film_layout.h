@@ -1,6 +1,6 @@
 // Which layers a film gets: decided once per render, read by the paths that fill them and by the film that keeps them.
-// Model: additive light per component and light group always; "planes" of translucency beside it, each per group too:
-//   one per ramp knot and one per compensation mode that was asked for.
+// Model: additive light per component and light group always; "planes" of the light of ice beside it, each per group too:
+//   one per ramp knot and one per compensation mode that was asked for, of ice that is seen and of its light elsewhere.
 // Valid: light groups have names that cannot be taken for another layer's: make_layout refuses the others.
 #pragma once
 
@@ -38,7 +38,8 @@ struct FilmLayout {
     std::vector<std::string> lpe_names;
     std::vector<LpeAutomaton> lpes;
 
-    // Planes: knots first, then modes.
+    // Planes: knots first, then modes, of translucency; then all of them once more, of the light of ice that is seen by way of
+    // another lobe (diffuse, specular, refraction); and that light as rendered.
     std::vector<RampKnot> knots;
     std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers
     std::size_t fill_plane = kNone;       // the knot plane of what `fill` adds
@@ -46,9 +47,12 @@ struct FilmLayout {
 
     static constexpr std::size_t kNone = ~std::size_t(0);
 
-    std::size_t plane_count() const { return knots.size() + modes.size(); }
+    std::size_t seen_plane_count() const { return knots.size() + modes.size(); }
+    std::size_t plane_count() const { return seen_plane_count() == 0 ? 0 : 2 * seen_plane_count() + 1; }
     bool has(std::string_view aov) const;
-    bool needs_fill() const;  // the light that enters at shading points, for a plane of the compensation `fill`
+    bool has_mode(CompensationMode mode) const;
+    bool needs_fill() const { return has_mode(CompensationMode::fill); }    // light that enters at shading points
+    bool needs_depth() const { return has_mode(CompensationMode::depth); }  // the thickness of bodies
 
     // Layer names: of a component or plane, and of one of its light groups.
     std::string plane_name(std::size_t plane) const;

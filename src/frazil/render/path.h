@@ -25,6 +25,9 @@
 
 namespace frazil {
 
+struct Path;
+struct IceCore;
+
 class PathTracer {
   public:
     // Everything must outlive the tracer. `group_of_light` gives each light's index among the light groups.
@@ -35,22 +38,18 @@ class PathTracer {
     // Trace one sample. `sampler` stands after the camera's own dimensions.
     void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
 
-    // Answer the tile's gather requests and forget them.
-    void gather(const GatherOptions& options, Tile& tile) const;
-
     // Each begins with an object's path.
     const std::vector<std::string>& warnings() const { return interiors_.warnings(); }
 
   private:
-    struct Path;
-    struct Core;
-    static float shadow_footprint(const Path& path);
     // Follow a path to its end; a part that is split off goes to `split`, where there is room for one.
     void follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
 
     // Radiance to the layers of the path's first lobe; to `primary` where the camera sees it directly.
     void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,
                  Tile& tile) const;
+    void add_own_light(const Path& path, const Surface& surface, const Shader& shader, Tile& tile) const;
+    bool reflect(Path& path, const Surface& surface, const Shader& shader, const V3f& wo, float odds) const;
     void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
@@ -60,22 +59,20 @@ class PathTracer {
                           Sampler& sampler, Tile& tile) const;
 
     // Ice: entering it, going on inside, meeting its boundary from inside. False where the path ends.
-    Core core_at(const Surface& surface, int body) const;
-    bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const Core& core,
+    IceCore core_at(const Surface& surface, int body) const;
+    bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const IceCore& core,
                Sampler& sampler) const;
     bool cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const;
     bool find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const;
     bool meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const;
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
-    void request_gather(const Path& path, const Core& core, const Rgb& share, Tile& tile) const;
-    void add_entering_light(Core& core, const Surface& surface, const Body& body, Sampler& sampler) const;
+    void request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const;
+    void add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const;
     // What light path expressions keep.
     void add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance, Tile& tile) const;
     void add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,
                          Tile& tile) const;
-    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, const Rgb* thin_gain,
-                    Tile& tile) const;
 
     const Scene& scene_;
     const RayScene& ray_scene_;

@@ -10,6 +10,7 @@
 #include "frazil/base/parallel.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
+#include "frazil/render/gathering.h"
 #include "frazil/render/path.h"
 #include "frazil/render/stopwatch.h"
 
@@ -176,8 +177,9 @@ class CheckpointClock {
 };
 
 // Trace and gather what this pass wants of a tile.
-void render_tile(const Scene& scene, const RenderOptions& options, const PathTracer& tracer, const V3f& view_axis,
-                 const FilterSampler& filter, const Canvas& canvas, std::size_t index, Tile& tile) {
+void render_tile(const Scene& scene, const RenderOptions& options, const PathTracer& tracer, const Gathering& gathering,
+                 const V3f& view_axis, const FilterSampler& filter, const Canvas& canvas, std::size_t index,
+                 Tile& tile) {
     const Canvas::Region r = canvas.region(index);
     const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
     for (int y = r.y0; y < r.y1; ++y) {
@@ -196,8 +198,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
             }
         }
     }
-    tile.gathers += tile.requests.size();
-    tracer.gather(options.gather, tile);
+    gathering.answer(options.gather, tile);
 }
 
 RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
@@ -210,16 +211,17 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const std::vector<std::string> groups = light_groups(scene.lights);
     if (baked) {
         check_bake(scene, *baked);
-        plant_trees(baked->bodies, groups.size(), ray_scene, bodies, stats);
+        plant_trees(baked->bodies, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
     } else {
         const Bake fresh = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
-        plant_trees(fresh.bodies, groups.size(), ray_scene, bodies, stats);
+        plant_trees(fresh.bodies, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
     const std::vector<std::size_t> group_of_light = groups_of(scene.lights, layout.groups);
     const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces,
                             pixel_cone(scene.camera, options.width, options.height));
+    const Gathering gathering(scene, bodies, layout);
     for (const std::string& warning : tracer.warnings()) stats.warnings.push_back(warning);
     const FilterSampler filter(options.filter);
     V3f view_axis;
@@ -238,7 +240,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             const std::vector<std::size_t> open = canvas.open_tiles();
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
                 Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size());
-                render_tile(scene, options, tracer, view_axis, filter, canvas, open[i], tile);
+                render_tile(scene, options, tracer, gathering, view_axis, filter, canvas, open[i], tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);
                 camera_rays += tile.camera_rays;

@@ -1,0 +1,191 @@
+// Paths: entering ice, going on inside it, meeting its boundary from inside.
+#include <algorithm>
+
+#include "frazil/render/path.h"
+#include "frazil/render/path_state.h"
+
+namespace frazil {
+namespace {
+
+constexpr int kMaxVolumePieces = 2;  // of a path have their single scattering traced
+// A refracted path that is worth less than this goes on by chance only.
+constexpr float kFaint = 0.02f;
+// Overlays that cover less than this are not seen from below.
+constexpr float kHiding = 0.01f;
+
+// The direction on the side of the plane that `sign` tells; one on the wrong side is mirrored at the plane.
+V3f on_side(const V3f& direction, const V3f& normal, float sign) {
+    const float cosine = direction.dot(normal) * sign;
+    return cosine > 0.0f ? direction : (direction - normal * (2.0f * sign * (cosine - 1e-5f))).normalized();
+}
+
+// What goes through is blurred at least as the overlays blur the reflection.
+float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
+    const float roughness = surface.covering.roughness;
+    if (ice.refraction_roughness < 0.0f) return alpha_from_roughness(roughness);
+    const float bare = eval_float(ice.roughness, surface.st);
+    return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
+}
+
+// How much wider a lobe makes the cone that a path stands for, per metre.
+float lobe_spread(float alpha) {
+    return 0.5f * alpha;
+}
+
+}  // namespace
+
+IceCore PathTracer::core_at(const Surface& surface, int body) const {
+    IceCore core;
+    core.body = body;
+    core.position = surface.position;
+    core.radiance_per_exitance = bodies_[std::size_t(body)]->inner_radiance_per_exitance(surface);
+    return core;
+}
+
+// `odds` is the chance with which the path came here, over what the boundary lets through.
+bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const IceCore& core,
+                       Sampler& sampler) const {
+    const IceMaterial& ice = *bodies_[surface.object]->material;
+    const float eta = interiors_.eta(crossing.to);
+    const Frame frame(surface.normal);
+    const BoundarySample sample =
+        sample_entering(frame.to_local(-path.ray.direction), refraction_alpha(ice, surface), eta,
+                        interiors_.transmission(static_cast<int>(surface.object)), sampler.next_2d());
+    if (!(sample.weight > 0.0f)) return false;
+
+    if (is_index_matched(eta) && path.has_direct_light) {
+        // No boundary: lights that were chosen at the last vertex are seen as through air.
+        path.scale(Rgb(sample.weight / odds));
+    } else {
+        path.pass_boundary();
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(sample.weight / odds), 0.0f}, surface.object);
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
+        path.is_delta = true;
+    }
+    path.inside = crossing.beyond;
+    // What overlays cover is not seen through; what they scatter the core does not get, so that its share grows.
+    const float bare = 1.0f - surface.covering.covered;
+    path.begin_piece(core, ice.volume * bare);
+    path.core.is_entered = true;
+    path.clear = ice.refraction * bare;
+    path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
+    path.spread += lobe_spread(refraction_alpha(ice, surface));
+    path.add_blur(refraction_alpha(ice, surface));
+    path.leave_from(surface.position, -surface.geometric_normal,
+                    on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+    return true;
+}
+
+// One piece of a path inside ice: what the core gives, what is scattered once, and what is left at its end.
+bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const {
+    const int body = interiors_.filling(path.inside);
+    if (body == InsideOf::kNone) return true;
+    constexpr float kFarAway = 1e18f;
+    const float way = std::min(length, kFarAway);
+    const Medium& medium = bodies_[std::size_t(body)]->material->medium;
+    const Rgb unscattered = exp(medium.sigma_s_prime * -way) * path.clear;
+
+    Rgb once(0.0f);
+    if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
+        const Segment segment{path.ray.origin, path.ray.direction, length, path.inside, path.shadow_footprint()};
+        const OnceScattered scattered = single_scattering_.sample(segment, sampler, tile.rays);
+        once = scattered.share * path.volume;
+        if (scattered.light >= 0 && scattered.radiance != Rgb(0.0f)) {
+            deliver(path, Component::volume, path.weights(), group_of_light_[std::size_t(scattered.light)],
+                    scattered.radiance * path.volume, tile);
+            add_lpes_beyond(path, LpeKind::volume, std::size_t(body), scattered.light, scattered.radiance * path.volume,
+                            tile);
+        }
+    }
+    request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
+
+    path.scale(unscattered * exp(medium.sigma_a * -way));
+    path.clear = path.core_share = 1.0f;
+    const Scattering w = path.weights();
+    const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
+    return left > 0.0f && path.survives(left / kFaint);
+}
+
+// From inside: light of the outside, then reflect or go through.
+bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
+                               Tile& tile) const {
+    const IceMaterial& ice = *bodies_[surface.object]->material;
+    const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
+    if (is_index_matched(eta)) {
+        path.inside = crossing.beyond;
+        path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
+        ++path.straight;
+        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to);
+        return true;
+    }
+    if (path.inner >= kMaxInnerBounces) {
+        request_gather(path, core_at(surface, crossing.from), Rgb(1.0f), tile);
+        return false;
+    }
+    ++path.inner;
+    // What lies on the boundary is seen from below as the core sees it.
+    if (const float covered = surface.covering.covered; covered > kHiding) {
+        request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
+        path.scale(Rgb(1.0f - covered));
+        if (covered >= 1.0f) return false;
+    }
+    const float alpha = refraction_alpha(ice, surface);
+    if (crossing.to == InsideOf::kNone) add_light_beyond(path, surface, crossing, alpha, sampler, tile);
+
+    const Frame frame(surface.normal);
+    const V3f wo = frame.to_local(-path.ray.direction);
+    const float u_lobe = sampler.next_1d();
+    const BoundarySample sample = sample_inner(wo, alpha, eta, u_lobe, sampler.next_2d());
+    if (sample.is_reflection) {
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), 0.0f}, surface.object, LpeKind::inner_reflection);
+        path.receive(surface, V3f(0.0f), LightUse::refraction);
+        path.has_direct_light = path.sees_lamps = false;
+        path.light_share = Rgb(1.0f);
+        path.is_delta = true;
+        path.leave_from(surface.position, surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
+    } else {
+        path.pass_boundary();
+        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)}, surface.object);
+        path.receive(surface, -surface.geometric_normal, LightUse::refraction);
+        path.is_delta = crossing.to != InsideOf::kNone;
+        path.inside = crossing.beyond;
+        path.leave_from(surface.position, -surface.geometric_normal,
+                        on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
+    }
+    const int body = interiors_.filling(path.inside);
+    path.spread += lobe_spread(alpha);
+    path.add_blur(alpha);
+    if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
+    return true;
+}
+
+void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const {
+    if (core.body == InsideOf::kNone) return;
+    const Body& body = *bodies_[std::size_t(core.body)];
+    if (!body.tree || body.material->translucency == 0.0f) return;
+
+    GatherRequest request;
+    request.object = static_cast<std::uint32_t>(core.body);
+    request.pixel = path.pixel;
+    request.subset = tile.subset;
+    request.position = core.position;
+    request.is_primary = core.is_primary;
+    request.entering = core.entering;
+    request.entering_group = core.entering_group;
+    Scattering weights = path.weights();
+    weights.scale(core.radiance_per_exitance * share * body.core_scale);
+    request.diffuse = weights.diffuse;
+    request.specular = weights.specular;
+    (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
+    if (weights.sum() == Rgb(0.0f) && !core.is_primary) return;
+    for (const LpeTracks::Track& track : path.lpe.tracks) {
+        const auto seen_from = core.is_entered ? track.previous : track.state;
+        const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
+        if (state == LpeAutomaton::kDead) continue;
+        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
+    }
+    tile.requests.push_back(std::move(request));
+}
+
+}  // namespace frazil

@@ -1,0 +1,178 @@
+// What a path from the camera knows between two vertices, and what its vertices share.
+// Model: weights are kept by the layer of the first lobe; inside ice a path consists of pieces, each with the core that
+//   answers for what it leaves behind.
+// Units: metres, world space; weights are radiance to the camera per radiance; inside ice radiance over squared index.
+// Not: how a path goes on (path.cpp, path_ice.cpp, path_sheets.cpp) and what lights give it (path_lights.cpp).
+#pragma once
+
+#include <limits>
+#include <tuple>
+
+#include "frazil/base/sampler.h"
+#include "frazil/lighting/light_sampling.h"
+#include "frazil/render/interior.h"
+#include "frazil/render/lpe_tracks.h"
+#include "frazil/render/shading.h"
+#include "frazil/render/surface.h"
+
+namespace frazil {
+
+// Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike; a path that was split
+// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through, and of the
+// light that enters where ice is seen.
+constexpr std::uint32_t kDimensionsPerVertex = 16;
+constexpr std::uint32_t kSplitVertex = 64;
+constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768;
+// Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
+// for what is left.
+constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
+// How much wider an opaque surface makes the cone that a path stands for, per metre.
+constexpr float kScatteredSpread = 0.05f;
+
+// What a diffuse lobe counts for in Path::blur.
+constexpr float kDiffuseBlur = 0.3f;
+
+inline float multiplier(const Light& light, LightComponent component) {
+    return light.multipliers[static_cast<int>(component)];
+}
+
+// A point's frame of shading.
+struct Frame {
+    explicit Frame(const V3f& n) : normal(n) { std::tie(tangent, bitangent) = tangent_frame(n); }
+    V3f to_local(const V3f& v) const { return {v.dot(tangent), v.dot(bitangent), v.dot(normal)}; }
+    V3f to_world(const V3f& v) const { return tangent * v.x + bitangent * v.y + normal * v.z; }
+    V3f normal, tangent, bitangent;
+};
+
+// Where a piece of a path inside ice begins, and what its core sends from there.
+struct IceCore {
+    int body = InsideOf::kNone;
+    V3f position = V3f(0.0f);
+    Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
+    bool is_primary = false;                // seen by the camera itself
+    bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there
+    // Light that enters right here, for the compensation that fills up; its light group.
+    Rgb entering = Rgb(0.0f);
+    std::uint32_t entering_group = 0;
+};
+
+// The state of a path between two vertices.
+struct Path {
+    std::uint32_t pixel = 0, vertex = 0;
+    Ray ray;
+    Sampler sampler{0, 0, 0};
+    int bounce = 0;     // lobes that it was scattered by so far
+    int scattered = 0;  // of these, at surfaces other than boundaries met by refraction
+    int inner = 0;      // meetings with boundaries from inside
+    int straight = 0;   // surfaces that it went through without a lobe
+    // What light from before the last vertex is worth to the camera, by the layer of the first lobe; meaningless before the
+    // second vertex.
+    Scattering before;
+    // The last vertex: lobe values over pdf, and the pdf for MIS. Before the first vertex `refraction` is what ice in front
+    // of the camera leaves.
+    Scattering last;
+    bool is_delta = false;  // lights could not be chosen at the last vertex
+    // Who receives light at the last vertex (the camera: everything), and which multipliers weigh in the choice there.
+    LightReceiver receiver;
+    LightUse use = LightUse::surface;
+    bool has_shown = false;   // what is seen through ice
+    bool has_passed = false;  // through a surface without a lobe, since then
+    // Lights that were chosen at the last opaque vertex shine straight through ice; the part of a refracted path's weight
+    // that they have not served.
+    bool has_direct_light = false, is_glossy = false;
+    bool sees_lamps = true;  // lights other than domes; not after reflections inside ice, where they would be sparks
+    Rgb light_share = Rgb(1.0f);
+
+    InsideOf inside;
+    IceCore core;
+    float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
+    // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
+    float blur = 0.0f;
+    float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
+    LpeTracks lpe;                      // of the light path expressions that are asked for
+
+    // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
+    Scattering weights(float diffuse, float specular, float refraction) const {
+        if (bounce <= 1) return {last.diffuse * diffuse, last.specular * specular, last.refraction * refraction, 0.0f};
+        const Rgb lobes = last.diffuse * diffuse + last.specular * specular + last.refraction * refraction;
+        return {before.diffuse * lobes, before.specular * lobes, before.refraction * lobes, 0.0f};
+    }
+    Scattering weights() const { return weights(1.0f, 1.0f, 1.0f); }
+
+    // `refracted` is what the lobe of refraction does at the object.
+    void scatter(const Scattering& value_over_pdf, std::size_t object, LpeKind refracted = LpeKind::refraction) {
+        lpe.scatter({value_over_pdf.diffuse, value_over_pdf.specular, value_over_pdf.refraction}, refracted, object);
+        if (bounce > 0) {
+            before = weights();
+            last = value_over_pdf;
+        } else {
+            const Rgb attenuation = last.refraction;
+            last = value_over_pdf;
+            last.scale(attenuation);
+        }
+        ++bounce;
+    }
+
+    void add_blur(float alpha) { blur = std::min(1.0f, std::sqrt(blur * blur + alpha * alpha)); }
+
+    void scale(const Rgb& factor) {
+        last.scale(factor);
+        lpe.scale(factor);
+    }
+
+    // Go on with the given chance; false where the path ends.
+    bool survives(float chance) {
+        if (chance >= 1.0f) return true;
+        if (!(sampler.next_1d() < chance)) return false;
+        scale(Rgb(1.0f / chance));
+        return true;
+    }
+
+    // What it left behind when it went through a boundary: lights already served from the last opaque vertex.
+    void pass_boundary() {
+        if (!has_direct_light) return;
+        for (int c = 0; c < 3; ++c) {
+            const float all = last.diffuse[c] + last.specular[c] + last.refraction[c];
+            const float served = is_glossy ? last.diffuse[c] : last.diffuse[c] + last.specular[c];
+            light_share[c] *= all > 0.0f ? 1.0f - served / all : 0.0f;
+        }
+        has_direct_light = false;
+    }
+
+    // `side` is that of the surface which receives.
+    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
+        receiver = {surface.position, side, surface.object};
+        use = wanted;
+        has_passed = false;
+    }
+
+    void leave_from(const V3f& position, const V3f& side, const V3f& direction) {
+        ray.origin = offset_origin(position, side);
+        ray.direction = direction;
+        ray.t_min = 0.0f;
+        ray.t_max = std::numeric_limits<float>::infinity();
+    }
+    // The next piece of the path begins inside ice at the end of the last.
+    void begin_piece(const IceCore& from, float volume_weight) {
+        core = from;
+        clear = core_share = 1.0f;
+        volume = volume_weight;
+    }
+
+    // Straight on through a surface.
+    void pass_through(const Surface& surface, float t) {
+        ray.origin = offset_origin(surface.position, -surface.geometric_normal);
+        ray.t_max -= t;
+        ray.t_min = 0.0f;
+        has_passed = true;
+        ++straight;
+    }
+
+    // Overlays on the way of light need no detail.
+    float shadow_footprint() const { return 4.0f * width; }
+
+    void begin_vertex() { sampler.set_dimension(kDimensionsPerVertex * ++vertex); }
+};
+
+}  // namespace frazil
