@@ -59,6 +59,7 @@ _LAZY = {
     "Recipe": ".grade_recipe",
     "ice_preset": ".ice",
     "UsdScene": ".usd",
+    "formations": ".formations",
     "grade": ".grading",
     "bake": ".baking",
     "load_bake": ".baking",
@@ -113,6 +114,7 @@ __all__ = [
     "bake",
     "bake_irradiance",
     "bake_occlusion",
+    "formations",
     "fresnel_average",
     "fresnel_dielectric",
     "grade",
@@ -136,7 +138,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
-        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        module = importlib.import_module(_LAZY[name], __name__)
+        value = module if _LAZY[name] == f".{name}" else getattr(module, name)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'frazil' has no attribute {name!r}")

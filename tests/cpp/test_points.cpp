@@ -145,9 +145,17 @@ TEST_CASE("shares of a patch are what is nearest to each point, in floats and in
         CHECK(1.0 + gaps[0].excess == doctest::Approx(farthest).epsilon(0.02));
         CHECK(1.0 + gaps[0].excess >= farthest - 1e-5);
         CHECK(std::sqrt(1.0 + gap.excess2) == doctest::Approx(1.0 + gaps[0].excess).epsilon(1e-5));
-        const V3f there = scene.at(gap.x, gap.y);
+        const V3f there = scene.at(gap.corner.x, gap.corner.y);
         CHECK((scene.near.worlds[scene.nearest(there)] - there).length2() ==
               doctest::Approx(1.0 + gap.excess2).epsilon(1e-4));
+        // A place further in is still as far from its point as the spacing.
+        if (gap.excess2 < 0.0f) continue;
+        for (const float random : {0.0f, 0.3f, 0.999f}) {
+            const V2f inside = gap.place(random);
+            const V3f place = scene.at(inside.x, inside.y);
+            CHECK((scene.near.worlds[scene.nearest(place)] - place).length() >= 1.0f - 1e-5f);
+            if (random > 0.0f) CHECK((inside - gap.corner).length() > 1e-3f);
+        }
     }
 }
 

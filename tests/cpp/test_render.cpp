@@ -158,7 +158,7 @@ TEST_CASE("a stop that is asked for ends the render") {
 
 TEST_CASE("default spacing gives a tiny body a thousand points, and a vast one is warned of") {
     Scene scene = scene_of(sphere(1e-3f, 3), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
-    std::get<IceMaterial>(scene.materials[0].model).spacing = 0.0f;
+    std::get<IceMaterial>(scene.materials[0].model).spacing.value = 0.0f;
     scene.lights = {dome(Rgb(1.0f))};
     RenderOptions options = small();
     options.bake_samples = 1;

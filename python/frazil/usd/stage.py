@@ -46,6 +46,7 @@ def load_usd(
     *,
     purposes: Iterable[str] = ("default", "render"),
     subdivision_level: int = 2,
+    rest_frame: float | None = None,
 ) -> UsdScene:
     """Read a USD stage (.usd, .usda, .usdc, .usdz) as a scene.
 
@@ -62,6 +63,9 @@ def load_usd(
         Which purposes are rendered, of 'default', 'render', 'proxy' and 'guide'.
     subdivision_level : int
         How often each edge of a Catmull-Clark mesh is halved, >= 0; dense meshes are halved less often.
+    rest_frame : float, optional
+        Time code at which meshes that deform are in their rest pose, so that points stay on them in all frames; a
+        primvar `rest` or `Pref` of a mesh goes before it.
 
     Returns
     -------
@@ -80,7 +84,7 @@ def load_usd(
     >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
     >>> film = fz.render(scene)  # doctest: +SKIP
     """
-    context, diagnostics = _open(path, frame, purposes, subdivision_level)
+    context, diagnostics = _open(path, frame, purposes, subdivision_level, rest_frame)
     scene = UsdScene()
     StageWalker(context, scene).walk()
     if not scene.objects:
@@ -97,12 +101,14 @@ def load_usd(
     return scene
 
 
-def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tuple[str, Mesh]]:
+def read_meshes(
+    path: str | os.PathLike, frame: float | None = None, rest_frame: float | None = None
+) -> list[tuple[str, Mesh]]:
     """The meshes of a USD stage, instances and all, in world space.
 
     Parameters
     ----------
-    path, frame
+    path, frame, rest_frame
         As in load_usd.
 
     Returns
@@ -115,18 +121,20 @@ def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tup
     OSError
         The file is missing, empty, broken or no USD.
     """
-    context, diagnostics = _open(path, frame, ("default", "render"), 2)
+    context, diagnostics = _open(path, frame, ("default", "render"), 2, rest_frame)
     scene = Scene()
     StageWalker(context, scene).walk()
     _pass_on(context, diagnostics)
     return [(item.path, scene.mesh(item.mesh).transformed(item.matrix)) for item in scene.objects]
 
 
-def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int):
+def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int, rest_frame: float | None = None):
     """The stage at its time, and the delegate that keeps USD's own messages off the terminal."""
     name = os.fspath(path)
     if frame is not None and not math.isfinite(frame):
         raise ValueError(f"{name}: frame must be a finite number, got {frame}.")
+    if rest_frame is not None and not math.isfinite(rest_frame):
+        raise ValueError(f"{name}: rest_frame must be a finite number, got {rest_frame}.")
     if not 0 <= subdivision_level <= 8:
         raise ValueError(f"{name}: subdivision_level must be in 0..8, got {subdivision_level}.")
     wanted = frozenset(purposes)
@@ -152,7 +160,8 @@ def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level:
         time = Usd.TimeCode(stage.GetStartTimeCode())
     else:
         time = Usd.TimeCode.EarliestTime()
-    return ReadContext(stage, name, time, wanted, subdivision_level), diagnostics
+    rest_time = None if rest_frame is None else Usd.TimeCode(rest_frame)
+    return ReadContext(stage, name, time, wanted, subdivision_level, rest_time), diagnostics
 
 
 def _first_line(error: Tf.ErrorException) -> str:

@@ -180,6 +180,7 @@ void bind_options(nb::module_& module) {
         .def_rw("max_bounces", &RenderOptions::max_bounces)
         .def_rw("spacing", &RenderOptions::spacing)
         .def_rw("spacing_scale", &RenderOptions::spacing_scale)
+        .def_rw("spacing_pixels", &RenderOptions::spacing_pixels)
         .def_rw("bake_samples", &RenderOptions::bake_samples)
         .def_rw("bake_error", &RenderOptions::bake_error)
         .def_rw("translucent_shadows", &RenderOptions::translucent_shadows)

@@ -51,10 +51,16 @@ struct Share {
     float weight;  // its area; what it is of the patch's, the sum of all weights tells
 };
 
-// Where a patch is farthest from its points: there, squared distance less squared spacing.
+// Where a patch is farthest from its points: a corner of a share. There, squared distance less squared spacing.
 struct Gap {
-    float x = 0.0f, y = 0.0f;
+    V2f corner = V2f(0.0f);
     float excess2 = -1e30f;
+    V2f point = V2f(0.0f);   // whose share it is
+    V2f middle = V2f(0.0f);  // of the share's corners
+
+    // A place of the share, from the corner to the middle, that is farther from the point than the spacing was at the
+    // corner; `random` in [0, 1) says how far in.
+    V2f place(float random) const;
 };
 
 // The points of a cell that lie within `reach` of the patch's centre and whose normals make a cosine above `least_cosine`

@@ -241,7 +241,10 @@ bool share_patch_as(const Patch& patch, Candidates& candidates, std::vector<Shar
             store(part.x, x);
             store(part.y, y);
             const int corner = std::countr_zero(~less(excess2, splat(most)));
-            gap = {x[corner], y[corner], most};
+            const float more = float(kWide - part.count), inverse = 1.0f / float(part.count);
+            const V2f middle((sum(part.x) - more * x[kWide - 1]) * inverse,
+                             (sum(part.y) - more * y[kWide - 1]) * inverse);
+            gap = {V2f(x[corner], y[corner]), most, V2f(px[p], py[p]), middle};
         }
     }
     return true;
@@ -400,6 +403,15 @@ HWY_EXPORT(find_candidates_here);
 HWY_EXPORT(uncovered_cells_here);
 HWY_EXPORT(throw_darts_here);
 HWY_EXPORT(share_patch_here);
+
+V2f Gap::place(float random) const {
+    // |z - p|² along z = corner + f (middle - corner) falls by more than the excess from the smaller root on.
+    const V2f way = middle - corner;
+    const float a = way.length2(), b = (corner - point).dot(way), root2 = b * b - a * excess2;
+    float most = 1.0f;
+    if (b < 0.0f && root2 > 0.0f) most = std::min(most, (-b - std::sqrt(root2)) / a);
+    return corner + way * (most * random);
+}
 
 void Candidates::reserve(std::size_t capacity) {
     if (x.size() >= capacity) return;

@@ -116,7 +116,6 @@ PointSet finish(PointsInTiles& made, double spacing) {
                 points.normals[at] = dart.normal;
                 points.areas[at] = static_cast<float>(double(dart.quanta) * made.area_quantum);
                 points.triangles[at] = dart.triangle;
-                points.triangle_areas[at] = static_cast<float>(0.5 * triangle_cross(made.mesh, dart.triangle).length());
                 points.barycentrics[at++] = dart.uv;
             }
             std::vector<Dart>().swap(darts[tile]);

@@ -182,7 +182,11 @@ void TileFiller::cover(std::size_t i) {
         Gap gap;
         if (share_patch(patch, candidates_, shares_, gap)) {
             if (candidates_.count > 0 && gap.excess2 < -band) break;
-            if (gap.excess2 > band && place(patch, gap.x, gap.y, 0)) continue;
+            if (gap.excess2 > band) {
+                const V2f inside = gap.place(random_.next_float());
+                if (place(patch, inside.x, inside.y, 0)) continue;
+                if (place(patch, gap.corner.x, gap.corner.y, 0)) continue;
+            }
         }
         share_exactly(patch, frame_, candidates_, near_.worlds, kGapTolerance, shares_, gaps_);
         if (gaps_.empty()) break;

@@ -1,8 +1,8 @@
 // Poisson points in one tile, and the surface that is nearest to each of them.
 // Model: darts at random, first evenly over the tile, then patch by patch where no ball of a point covers the surface yet.
 //   Then every patch is shared out among its nearest points: where a corner of a share is farther from its point than the
-//   spacing, the farthest such corner takes a point, as it conflicts with nobody. A patch is left only when there is none: so
-//   it is covered by construction, and its shares are the areas.
+//   spacing, a point is put into that corner, where it conflicts with nobody. A patch is left only when there is none: so it
+//   is covered by construction, and its shares are the areas.
 // Units: darts in metres; inside, the tile's own unit.
 // Valid: sees the points that neighbouring tiles have already; a result is a function of those and the seed alone.
 // Not: thread-safe; one filler per thread, which keeps its memory from tile to tile.
