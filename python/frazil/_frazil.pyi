@@ -1018,12 +1018,18 @@ class Overlay:
     size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.
     feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.
     amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.
-    mask : multiplies the pattern; a constant or a TextureLookup.
+    mask : multiplies the pattern; a constant or a TextureLookup. name : of its layers in a picture.
 
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, pattern: str = 'solid', *, color: Sequence[float] = [0.8999999761581421, 0.949999988079071, 1.0], opacity: float = 1.0, roughness: float = 0.5, scattering: float = 0.699999988079071, bump: float = 0.0, internal: float = 0.0, age_begin: float = 0.0, age_end: float = 1.0, size: float = 0.30000001192092896, width: float = 0.004000000189989805, feather: float = 0.004000000189989805, warp: float = 0.20000000298023224, scales: int = 2, amount: float = 0.5, slope: float = 0.0, direction: Sequence[float] = [0.0, 1.0, 0.0], seed: int = 0, mask: TextureLookup | float = 1.0) -> None: ...
+    def __init__(self, pattern: str = 'solid', *, color: Sequence[float] = [0.8999999761581421, 0.949999988079071, 1.0], opacity: float = 1.0, roughness: float = 0.5, scattering: float = 0.699999988079071, bump: float = 0.0, internal: float = 0.0, age_begin: float = 0.0, age_end: float = 1.0, size: float = 0.30000001192092896, width: float = 0.004000000189989805, feather: float = 0.004000000189989805, warp: float = 0.20000000298023224, scales: int = 2, amount: float = 0.5, slope: float = 0.0, direction: Sequence[float] = [0.0, 1.0, 0.0], seed: int = 0, mask: TextureLookup | float = 1.0, name: str = '') -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @name.setter
+    def name(self, arg: str, /) -> None: ...
 
     @property
     def pattern(self) -> str: ...
@@ -1452,6 +1458,18 @@ class Scene:
     @property
     def lights(self) -> list[Light]: ...
 
+    def set_motion(self, next: Scene) -> None:
+        """
+        Tell how the scene goes on, by the same scene a frame later: for the AOV motion. Objects are paired by path.
+        """
+
+    @property
+    def motion(self) -> dict | None:
+        """
+        What set_motion told: (4, 4) matrices of the objects, (V, 3) positions of the meshes (empty where they stay)
+        and the camera; None without.
+        """
+
     def __repr__(self) -> str: ...
 
 class RenderOptions:
@@ -1635,6 +1653,12 @@ class RenderResult:
     @property
     def compensations(self) -> list:
         """list of dict, one per material of ice: material, mode, strength."""
+
+    @property
+    def overlays(self) -> list:
+        """
+        list of dict, one per overlay that has layers: name, material, opacity, age, age_begin, age_end.
+        """
 
     @property
     def stats(self) -> dict:

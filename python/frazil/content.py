@@ -31,8 +31,10 @@ def content_hash(*values: Any) -> str:
 
 
 def scene_hash(scene: Any, leaving_out: Sequence[str] = ()) -> str:
-    """The content of what light meets: meshes, materials, placements. Neither lights nor camera, nor properties of materials
-    whose names begin as `leaving_out` says."""
+    """The content of what light meets: meshes, materials, placements; neither lights nor camera.
+
+    Properties of materials whose names begin as `leaving_out` says do not count.
+    """
     meshes = [content_hash(scene.mesh(i)) for i in range(len(scene.mesh_paths))]
     digest = hashlib.blake2b(digest_size=16)
     _feed(digest, (version(), meshes, scene.objects))

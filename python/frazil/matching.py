@@ -210,8 +210,8 @@ class _Problem:
     def refine(self, recipe: dict[str, Any]) -> dict[str, Any]:
         """A recipe whose picture rounds to the reference everywhere, where there is one; else the recipe as it is.
 
-        Rounding errors of a light's smooth regions are all alike: least squares take them for light. That every value must
-        round to the file's tells faint lights many times more exactly [Dantzig's simplex, by HiGHS].
+        Rounding errors of a light's smooth regions are all alike: least squares take them for light. That every value
+        must round to the file's tells faint lights many times more exactly: a linear program.
         """
         if self.steps is None or "lights" not in recipe:
             return recipe
@@ -312,8 +312,11 @@ def _picture(source: "np.ndarray | str | os.PathLike") -> tuple[np.ndarray, np.n
 
 
 def _confidence(weights: np.ndarray, steps: np.ndarray | None) -> np.ndarray:
-    """(pixels, 3): how much each value counts. A file of whole numbers tells dark values more exactly than bright ones, and
-    of those at its ends only that they are beyond; least squares then are those of the values as encoded."""
+    """(pixels, 3): how much each value counts.
+
+    A file of whole numbers tells dark values more exactly than bright ones, and of those at its ends only that they are
+    beyond; least squares then are those of the values as encoded.
+    """
     values = np.repeat(weights.reshape(-1, 1).astype(np.float64), 3, axis=1)
     if steps is None:
         return values

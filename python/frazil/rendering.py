@@ -263,6 +263,7 @@ def _what_layers_hold(result: Any) -> dict[str, Any]:
         "frazil:additive": [row["name"] for row in _frazil.aov_table() if row["is_additive"]],
         "frazil:compensation": json.dumps(list(result.compensations)),
         "frazil:ramp_knots": json.dumps(knots) if knots else None,
+        "frazil:overlays": json.dumps(list(result.overlays)) if result.overlays else None,
     }
 
 

@@ -14,7 +14,7 @@ def placed(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:
 
 
 def ice_over_floor(key: float = 40.0, sky: float = 0.4, radius: float = 1.0, camera_x: float = 0.0, **look) -> fz.Scene:
-    """The scene; `key` and `sky` are the lights' radiance, `camera_x` moves the camera alone, `look` is of IceMaterial."""
+    """The scene; `key` and `sky` are radiances, `camera_x` moves the camera alone, `look` is of IceMaterial."""
     scene = fz.Scene()
     ball = trimesh.creation.icosphere(3, radius)
     ice = fz.Mesh(np.asarray(ball.vertices, np.float32), np.asarray(ball.faces, np.int32))

@@ -89,7 +89,7 @@ def render(aovs=(), bounces=1, samples=4, **changes):
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    """An EXR with all that a recipe may ask for; ice is lit by the floor and by ice, and seen in the floor and through ice."""
+    """An EXR with all that a recipe may ask for; ice is lit by floor and ice, and seen in the floor and through ice."""
     path = tmp_path_factory.mktemp("grade") / "in.exr"
     render(aovs=["translucency_ramp", *(f"compensation_{mode}" for mode in MODES)]).save(path, "zip")
     return path
@@ -154,6 +154,10 @@ def assert_same_translucency(film, recipe, expected):
     assert np.abs(changes[1]).max() > 3e-4
     assert np.abs(changes[0] - changes[1]).max() < 0.3 * np.abs(changes[1]).max()
     assert_same_picture(graded, expected, 4 * (magnitude(film) + magnitude(expected)))
+
+
+def test_a_white_ramp_is_a_new_render(film):
+    assert_same_translucency(film, {"ramp": {"colors": [(1, 1, 1)] * 3}}, render(colors=[(1, 1, 1)] * 3))
 
 
 @pytest.mark.parametrize("preserve", [False, True])

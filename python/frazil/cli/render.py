@@ -165,7 +165,7 @@ def render_command(
 
     from ..aovs import layers_of
     from ..rendering import render as render_scene
-    from ..usd import load_usd
+    from ..usd import add_motion, load_usd
 
     options: dict[str, Any] = {
         "samples": samples,
@@ -196,6 +196,8 @@ def render_command(
 
             chosen = layers or _authored_layers(loaded)
             options["aovs"] = chosen or ()
+            if chosen and "motion" in chosen:
+                add_motion(loaded)
             options["lpes"] = expressions | _authored_lpes(loaded)
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)

@@ -187,7 +187,8 @@ class MaterialReader:
                     f"{values['age_begin']:g} is used.",
                 )
                 values["age_end"] = values["age_begin"]
-            overlays.append(Overlay(**values))
+            name = overlay_input.GetBaseName().removeprefix(_OVERLAY_PREFIX)
+            overlays.append(Overlay(**values, name=name))
             masks[str(shader.GetPath())] = sources["mask"]
         return overlays, masks
 

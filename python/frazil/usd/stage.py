@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
 from pxr import Tf, Usd, UsdUtils
 
 from .._frazil import Mesh, Scene
+from ..warning import FrazilWarning
 from .camera import choose_camera
 from .context import ReadContext
 from .instancing import StageWalker
@@ -97,8 +99,44 @@ def load_usd(
     scene.file = context.file
     scene.frame = None if context.time.IsDefault() or context.time.IsEarliestTime() else context.time.GetValue()
     scene.render_settings = settings
+    scene.reading = (frozenset(purposes), subdivision_level, rest_frame)
     scene.warnings = context.warnings
     return scene
+
+
+def add_motion(scene: UsdScene, frames: float = 1.0) -> None:
+    """Tell a scene how it goes on, so that the layer ``motion`` can be rendered.
+
+    Parameters
+    ----------
+    scene : UsdScene
+        From load_usd.
+    frames : float
+        How far ahead the place is that motion vectors point to.
+
+    Raises
+    ------
+    OSError
+        The stage is no longer there.
+
+    Examples
+    --------
+    >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
+    >>> fz.add_motion(scene)  # doctest: +SKIP
+    >>> motion = fz.render(scene, aovs=["motion"])["motion"]  # doctest: +SKIP
+    """
+    if scene.frame is None:  # no time: all stands still
+        scene.set_motion(scene)
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrazilWarning)  # said when the scene was read
+        context, diagnostics = _open(scene.file, scene.frame + frames, *scene.reading)
+        later = Scene()
+        StageWalker(context, later).walk()
+        prim = context.stage.GetPrimAtPath(scene.camera.path) if scene.camera.path.startswith("/") else None
+        later.camera = choose_camera(context, later, scene.camera.path, None) if prim else scene.camera
+        diagnostics.TakeUncoalescedDiagnostics()
+    scene.set_motion(later)
 
 
 def read_meshes(

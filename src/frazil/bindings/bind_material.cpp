@@ -226,15 +226,16 @@ void bind_overlay(nb::module_& module) {
         "size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.\n"
         "feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.\n"
         "amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.\n"
-        "mask : multiplies the pattern; a constant or a TextureLookup.\n\n"
+        "mask : multiplies the pattern; a constant or a TextureLookup. name : of its layers in a picture.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
         [](Overlay* self, const std::string& kind, const Triple& color, float opacity, float roughness,
            float scattering, float bump, float internal, float age_begin, float age_end, float size, float width,
            float feather, float warp, int scales, float amount, float slope, const Triple& direction,
-           std::uint32_t seed, const FloatInput& mask) {
+           std::uint32_t seed, const FloatInput& mask, const std::string& name) {
             Overlay made;
+            made.name = name;
             made.color = to_v3f(color);
             made.opacity = opacity;
             made.roughness = roughness;
@@ -261,8 +262,10 @@ void bind_overlay(nb::module_& module) {
         "internal"_a = preset.internal, "age_begin"_a = preset.age_begin, "age_end"_a = preset.age_end,
         "size"_a = pattern.size, "width"_a = pattern.width, "feather"_a = pattern.feather, "warp"_a = pattern.warp,
         "scales"_a = pattern.scales, "amount"_a = pattern.amount, "slope"_a = pattern.slope,
-        "direction"_a = from_v3f(pattern.direction), "seed"_a = pattern.seed, "mask"_a = FloatInput(1.0f));
-    cls.def_prop_ro("pattern", [](const Overlay& o) { return to_name(kPatternNames, o.pattern.kind); })
+        "direction"_a = from_v3f(pattern.direction), "seed"_a = pattern.seed, "mask"_a = FloatInput(1.0f),
+        "name"_a = "");
+    cls.def_rw("name", &Overlay::name)
+        .def_prop_ro("pattern", [](const Overlay& o) { return to_name(kPatternNames, o.pattern.kind); })
         .def_prop_rw(
             "color", [](const Overlay& o) { return from_v3f(o.color); },
             [](Overlay& o, const Triple& color) { o.color = to_v3f(color); })

@@ -55,7 +55,8 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         const double traced = is_traced ? material->volume : 0.0;
         auto& profile = profiles[{material, is_traced}];
         if (!profile) profile = make_profile(material->profile, medium, 1.0 - traced);
-        bodies[i] = std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr});
+        bodies[i] =
+            std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr, nullptr});
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));

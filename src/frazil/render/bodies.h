@@ -22,9 +22,10 @@ struct Body {
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
-    Rgb total_reflectance = Rgb(0.0f);           // Rd_total
-    std::unique_ptr<const PointTree> tree;       // none where the object has no surface
-    std::unique_ptr<const PointTree> thickness;  // make_thickness_tree
+    Rgb total_reflectance = Rgb(0.0f);              // Rd_total
+    std::unique_ptr<const PointTree> tree;          // none where the object has no surface
+    std::unique_ptr<const PointTree> thickness;     // make_thickness_tree
+    std::unique_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);

@@ -63,6 +63,8 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
         const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
+        Gathered by_overlay;
+        if (body.overlay_tree) by_overlay = body.overlay_tree->gather(positions.data(), positions.size(), options);
         const std::vector<Rgb> thin =
             thickness_gains(body.thickness.get(), positions.data(), positions.size(), with_layers);
 
@@ -94,21 +96,48 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
                 tile.add_coverage(request.pixel, coverage, lacking);
             }
-            if (layout_.plane_count() == 0) continue;
+            if (!request.overlays.empty()) {
+                const Rgb* taken =
+                    request.is_primary && body.overlay_tree ? &by_overlay.exitance[row * by_overlay.groups] : nullptr;
+                add_overlays(request, &gathered.exitance[row * gathered.groups], taken, gathered.groups, gain, fill,
+                             tile);
+            }
+            if (layout_.ice_plane_count() == 0) continue;
             const Rgb elsewhere = request.diffuse + request.specular + request.refraction;
             if (request.is_primary) add_planes(request, request.translucency, 0, gathered, row, thin_gain, tile);
             if (elsewhere != Rgb(0.0f)) {
                 add_planes(request, elsewhere, layout_.seen_plane_count(), gathered, row, thin_gain, tile);
                 for (std::size_t group = 0; group < gathered.groups; ++group) {
                     const Rgb exitance = gathered.exitance[row * gathered.groups + group] * gain;
-                    tile.add_to_plane(request.pixel, layout_.plane_count() - 1, group, exitance * elsewhere);
+                    tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, group, exitance * elsewhere);
                 }
-                tile.add_to_plane(request.pixel, layout_.plane_count() - 1, request.entering_group, fill * elsewhere);
+                tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, request.entering_group,
+                                  fill * elsewhere);
             }
         }
         begin = end;
     }
     tile.requests.clear();
+}
+
+// What a change of each overlay's opacity adds: to light that came by way of it, and to what enters the points around here.
+// `taken` is (overlays, groups).
+void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, const Rgb* taken, std::size_t groups,
+                             const Rgb& gain, const Rgb& fill, Tile& tile) const {
+    for (const GatherRequest::Overlay& overlay : request.overlays) {
+        for (std::size_t group = 0; group < groups; ++group) {
+            Rgb light = exitance[group] * gain;
+            if (group == request.entering_group) light += fill;
+            const auto add = [&](FilmLayout::OverlayPlane plane, const Rgb& change) {
+                tile.add_to_plane(request.pixel, overlay.plane + plane, group, change);
+            };
+            const Rgb less = taken ? taken[overlay.own * groups + group] * gain : Rgb(0.0f);
+            add(FilmLayout::kDiffuse, light * request.diffuse * overlay.diffuse);
+            add(FilmLayout::kTranslucency, (light * overlay.core + less) * request.translucency);
+            add(FilmLayout::kRefraction, light * request.refraction * overlay.seen_through);
+            add(FilmLayout::kSquared, less * overlay.core * request.translucency);
+        }
+    }
 }
 
 // Light of the core once more, apart by ramp knot and as every compensation mode that was asked for would have it: `weight`

@@ -13,7 +13,7 @@ constexpr int kBouncesBeforeRoulette = 3;
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-                       const FilmLayout& layout, int max_bounces, const PixelCone& pixel)
+                       const FilmLayout& layout, int max_bounces, const PixelCone& pixel, const MotionVectors* motion)
     : scene_(scene),
       ray_scene_(ray_scene),
       lights_(lights),
@@ -25,7 +25,8 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       single_scattering_(lights, interiors_, bodies),
       camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
       max_bounces_(max_bounces),
-      pixel_(pixel) {}
+      pixel_(pixel),
+      motion_(motion) {}
 
 void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                        Tile& tile) const {
@@ -72,7 +73,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             continue;
         }
         add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
-        if (!is_hit) return;
+        if (!is_hit) {
+            if (view_axis && motion_) tile.add_background(path.pixel, motion_->of_background(path.ray.direction));
+            return;
+        }
 
         const V3f wo = -path.ray.direction;
         path.width += path.spread * length;
@@ -81,8 +85,9 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
-            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1,
-                                          surface.st, surface.local_position});
+            tile.add_primary(path.pixel,
+                             {depth, surface.position, surface.normal, albedo, surface.object + 1, surface.st,
+                              surface.local_position, motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
             tile.add_object(path.pixel, surface.object, false);
             view_axis = nullptr;
         };
@@ -126,6 +131,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         add_own_light(path, surface, shader, tile);
         float reflection_odds = 1.0f;
         if (body) {
+            if (path.bounce == 0 && !layout_.overlay_names.empty()) {
+                path.overlays = overlay_shares(surface, resolver_.slopes(surface));
+                path.first_material = scene_.objects[surface.object].material;
+            }
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             IceCore core = core_at(surface, static_cast<int>(surface.object));
             core.is_primary = path.bounce == 0;

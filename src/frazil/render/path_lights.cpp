@@ -5,6 +5,23 @@
 
 namespace frazil {
 
+void PathTracer::add_light(const Path& path, Component component, std::size_t group, const Rgb& radiance,
+                           Tile& tile) const {
+    tile.add(path.pixel, component, group, radiance);
+    for (const OverlayShare& overlay : path.overlays) {
+        const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
+        if (component == Component::diffuse) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kDiffuse, group, radiance * overlay.diffuse);
+        }
+        if (component == Component::refraction) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kRefraction, group, radiance * overlay.seen_through);
+        }
+        if (component == Component::volume) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kVolume, group, radiance * overlay.seen_through);
+        }
+    }
+}
+
 void PathTracer::deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group,
                          const Rgb& radiance, Tile& tile) const {
     if (path.bounce == 0) {
@@ -12,7 +29,7 @@ void PathTracer::deliver(const Path& path, Component primary, const Scattering& 
         return;
     }
     const auto add = [&](Component component, const Rgb& weight) {
-        if (weight != Rgb(0.0f)) tile.add(path.pixel, component, group, weight * radiance);
+        if (weight != Rgb(0.0f)) add_light(path, component, group, weight * radiance, tile);
     };
     add(Component::diffuse, weights.diffuse);
     add(Component::specular, weights.specular);
@@ -97,9 +114,9 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     } else {
         weights.scale(path.last.refraction);
     }
-    tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
-    tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
-    tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
+    add_light(path, Component::diffuse, group, weights.diffuse * light_over_pdf, tile);
+    add_light(path, Component::specular, group, weights.specular * light_over_pdf, tile);
+    add_light(path, Component::refraction, group, weights.refraction * light_over_pdf, tile);
     add_lpes_beyond(path, LpeKind::diffuse, surface.object, sample.light, diffuse_lobe * light_over_pdf, tile);
     add_lpes_beyond(path, LpeKind::glossy, surface.object, sample.light, specular_lobe * light_over_pdf, tile);
 }

@@ -12,6 +12,7 @@
 #include "frazil/lighting/light_sampling.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/lpe_tracks.h"
+#include "frazil/render/overlay_layers.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
 
@@ -89,8 +90,10 @@ struct Path {
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
     // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
     float blur = 0.0f;
-    float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
-    LpeTracks lpe;                      // of the light path expressions that are asked for
+    float width = 0.0f, spread = 0.0f;   // of the cone that the path stands for: radius at the ray's origin, per metre
+    LpeTracks lpe;                       // of the light path expressions that are asked for
+    std::vector<OverlayShare> overlays;  // where the camera sees ice first, if their layers are asked for
+    std::uint32_t first_material = 0;    // of that ice
 
     // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
     Scattering weights(float diffuse, float specular, float refraction) const {
