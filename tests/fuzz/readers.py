@@ -49,7 +49,10 @@ def Xform "World"
             int[] indices = [0, 2]
         }
     }
-    def Sphere "Ball" { double radius = 20 }
+    def Sphere "Ball"
+    {
+        double radius = 20
+    }
     def PointInstancer "Crowd"
     {
         int[] protoIndices = [0, 0]
@@ -57,7 +60,10 @@ def Xform "World"
         quath[] orientations = [(1, 0, 0, 0), (0.5, 0.5, 0.5, 0.5)]
         float3[] scales = [(1, 1, 1), (2, 2, 2)]
         rel prototypes = [</World/Crowd/One>]
-        def Cube "One" { double size = 3 }
+        def Cube "One"
+        {
+            double size = 3
+        }
     }
     def Scope "Looks"
     {
@@ -108,7 +114,10 @@ def RenderSettings "Settings"
     rel camera = </World/Camera>
     rel products = </Product>
 }
-def RenderProduct "Product" { rel orderedVars = </Var> }
+def RenderProduct "Product"
+{
+    rel orderedVars = </Var>
+}
 def RenderVar "Var"
 {
     string sourceName = "C<TD>.*"

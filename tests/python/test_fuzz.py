@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import frazil as fz
+
 FUZZ = Path(__file__).parents[1] / "fuzz" / "fuzz.py"
 TARGETS = ("usd", "mesh", "arrays", "recipe", "lpe", "exr", "picture", "bake", "points", "checkpoint")
 
@@ -33,3 +35,19 @@ def test_a_finding_is_kept_and_said(tmp_path):
     result = subprocess.run([sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, timeout=300)
     assert result.returncode == 1
     assert "RuntimeError: found" in result.stderr
+
+
+def test_the_stage_that_is_fuzzed_is_read_whole(tmp_path, monkeypatch):
+    """Else only the parser of text would be fuzzed."""
+    monkeypatch.syspath_prepend(FUZZ.parent)
+    import readers
+
+    (tmp_path / "seed.usda").write_text(readers.USDA)
+    with pytest.warns(fz.FrazilWarning) as said:
+        scene = fz.load_usd(tmp_path / "seed.usda")
+    assert len(scene.objects) == 5
+    assert len(scene.lights) == 2
+    assert scene.camera.path == "/World/Camera"
+    assert scene.render_settings.product.vars[0].source_type == "lpe"
+    assert any(isinstance(material.model, fz.IceMaterial) and material.model.overlays for material in scene.materials)
+    assert all("none.exr" in str(warning.message) for warning in said), [str(warning.message) for warning in said]
