@@ -101,14 +101,22 @@ void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathe
     }
 }
 
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const PointSet& points) {
+    const Object& placed = scene.objects[object];
+    return std::make_shared<const Cells>(
+        cells_of(points, transformed(scene.meshes[placed.mesh], placed.local_to_world)));
+}
+
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
                  std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
         const Body& body = *bodies[i];
+        std::shared_ptr<const Cells> cells = lit[i].cells;
+        if (!cells && !lit[i].moments.empty()) cells = cells_of_body(scene, i, lit[i].points);
         bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
-                                                            body.material->ramp);
+                                                            body.material->ramp, cells.get(), lit[i].moments);
         bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
         bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
         stats.points += bodies[i]->tree->point_count();

@@ -19,9 +19,12 @@ struct Exitance {
     std::unique_ptr<const PointLookup> lookup;
 };
 
-Exitance exitance_of(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
-                     const std::vector<Rgb>& gains, const GatherOptions& options) {
-    const PointTree tree(points, irradiance, groups, body.profile, body.material->ramp);
+Exitance exitance_of(const Body& body, const LitPoints& lit, const Irradiance& last, const std::vector<Rgb>& gains,
+                     const GatherOptions& options) {
+    const PointSet& points = lit.points;
+    const std::vector<Rgb>& irradiance = last.values;
+    const PointTree tree(points, irradiance, last.groups, body.profile, body.material->ramp, lit.cells.get(),
+                         last.moments);
     Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
     compensate(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
@@ -57,10 +60,12 @@ Rgb diffuse_albedo(const SurfaceResolver& resolver, const BounceHit& hit) {
 
 }  // namespace
 
-void keep_entering(const std::vector<float>& entering, std::vector<Rgb>& irradiance) {
+void keep_entering(const std::vector<float>& entering, Irradiance& irradiance) {
     if (entering.empty()) return;
-    const std::size_t groups = irradiance.size() / entering.size();
-    for (std::size_t k = 0; k < irradiance.size(); ++k) irradiance[k] *= entering[k / groups];
+    for (std::size_t k = 0; k < irradiance.values.size(); ++k) {
+        irradiance.values[k] *= entering[k / irradiance.groups];
+        if (!irradiance.moments.empty()) irradiance.moments[k] *= entering[k / irradiance.groups];
+    }
 }
 
 void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
@@ -74,10 +79,12 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         ray_scene, lights, [&](const BounceHit& hit) { return diffuse_albedo(resolver, hit); },
         kShadowRaysPerReflection, options.seed);
 
-    std::vector<std::vector<Rgb>> last(lit.size());   // what the last bounce brought
+    std::vector<Irradiance> last(lit.size());         // what the last bounce brought
     std::vector<std::vector<Rgb>> gains(lit.size());  // of thin parts
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        last[i] = lit[i].irradiance;
+        last[i].groups = groups;
+        last[i].values = lit[i].irradiance;
+        last[i].moments = lit[i].moments;
         if (!bodies[i]) continue;
         const PointSet& points = lit[i].points;
         const auto thickness = make_thickness_tree(*bodies[i], points, ray_scene);
@@ -86,25 +93,32 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exitance> exitance(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].empty()) continue;
-            exitance[i] = exitance_of(*bodies[i], lit[i].points, last[i], groups, gains[i], options.gather);
+            if (last[i].values.empty()) continue;
+            exitance[i] = exitance_of(*bodies[i], lit[i], last[i], gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].empty()) continue;
+            if (last[i].values.empty()) continue;
             const IceMaterial& material = *bodies[i]->material;
-            Irradiance brought = bake_bounce(
+            IrradianceOptions bake_options{std::max(1, options.bake_samples / 4),
+                                           options.seed + static_cast<std::uint32_t>(bounce)};
+            Mesh mesh;
+            if (lit[i].cells) {
+                mesh = transformed(scene.meshes[scene.objects[i].mesh], scene.objects[i].local_to_world);
+                bake_options.cells = {lit[i].cells.get(), &mesh};
+            }
+            last[i] = bake_bounce(
                 lit[i].points, ray_scene, groups,
                 [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                     add_ice(bodies, exitance, resolver, groups, hits, radiance);
                     if (bounce == 0) reflected(hits, radiance);
                 },
-                [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); },
-                {std::max(1, options.bake_samples / 4), options.seed + static_cast<std::uint32_t>(bounce)}, progress);
-            stats.bake_rays += brought.rays;
-            stats.dropped_samples += brought.dropped_samples;
-            keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), brought.values);
-            for (std::size_t k = 0; k < brought.values.size(); ++k) lit[i].irradiance[k] += brought.values[k];
-            last[i] = brought.values;
+                [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
+                progress);
+            stats.bake_rays += last[i].rays;
+            stats.dropped_samples += last[i].dropped_samples;
+            keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), last[i]);
+            for (std::size_t k = 0; k < last[i].values.size(); ++k) lit[i].irradiance[k] += last[i].values[k];
+            for (std::size_t k = 0; k < last[i].moments.size(); ++k) lit[i].moments[k] += last[i].moments[k];
         }
     }
 }

@@ -212,10 +212,10 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const std::vector<std::string> groups = light_groups(scene.lights);
     if (baked) {
         check_bake(scene, *baked);
-        plant_trees(baked->bodies, groups.size(), ray_scene, bodies, stats);
+        plant_trees(scene, baked->bodies, groups.size(), ray_scene, bodies, stats);
     } else {
         const Bake fresh = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
-        plant_trees(fresh.bodies, groups.size(), ray_scene, bodies, stats);
+        plant_trees(scene, fresh.bodies, groups.size(), ray_scene, bodies, stats);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
