@@ -1,19 +1,23 @@
 """Poisson points against the samplers that geometry people use today, on one mesh, in one run.
 
-    python bench/points.py MESH --counts 100000 1000000 -o bench/results/points
+    python bench/points.py [MESH] --counts 100000 1000000 -o bench/results/points
 
-Makes a virtual environment for the peers (pymeshlab, libigl, Open3D, trimesh) unless --peers-python names one. Every
-sampler runs in a process of its own, so that its time and peak memory are its own. Gaps, nearest pairs and the pair
-correlation are measured alike for all, by scipy. Writes a table (.md), all numbers (.json) and a plot (.png).
+Without a mesh the teapot of examples/teapot.py is taken. Makes a virtual environment for the peers (pymeshlab, libigl,
+Open3D, trimesh) unless --peers-python names one; Open3D wants the Debian package libusb-1.0-0, which is installed where
+apt-get may, else its row says what is missing. Every sampler runs in a process of its own, so that its time and peak
+memory are its own. Gaps, nearest pairs and the pair correlation are measured alike for all, by scipy. Writes a table
+(.md), all numbers (.json) and a plot (.png).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
+from ctypes.util import find_library
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +35,11 @@ data = np.load(path)
 V, F = data['V'], data['F']
 """
 FINISH = """
-seconds = time.perf_counter() - start
+seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
 peak = highest()
-np.savez(output, P=np.asarray(P, np.float64), seconds=seconds, base=base, peak=peak, **extra)
+np.savez(output, P=np.asarray(P, np.float64), seconds=seconds, cpu=cpu, base=base, peak=peak, **extra)
 """
-BASE = "base = highest(); extra = {}; start = time.perf_counter()\n"
+BASE = "base = highest(); extra = {}; start = time.perf_counter(); cpu = time.process_time()\n"
 SCRIPTS = {
     "frazil": COMMON
     + "import frazil as fz\nmesh = fz.Mesh(V.astype(np.float32), F.astype(np.int32))\n"
@@ -128,25 +132,30 @@ def peers_python(folder: Path) -> str:
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
         subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy", *PEERS], check=True)
+    if find_library("usb-1.0") is None and os.geteuid() == 0:
+        subprocess.run(["apt-get", "install", "-qq", "-y", "libusb-1.0-0"], capture_output=True)
     return str(python)
 
 
-def write(rows: list[dict], output: Path, mesh: Path, area: float) -> None:
+def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
-    output.with_suffix(".json").write_text(json.dumps({"mesh": mesh.name, "area": area, "rows": rows}, indent=1))
+    output.with_suffix(".json").write_text(json.dumps({"mesh": mesh, "area": area, "rows": rows}, indent=1))
     lines = [
-        f"`{mesh.name}`; times of the sampler alone, without loading; gap and nearest pair through the air.",
+        f"`{mesh}`; times of the sampler alone, without loading; processor time of all its threads; "
+        f"gap and nearest pair through the air.",
         "",
-        "| sampler | asked | points | s | points/s | x slower | gap / nearest pair | distance spread | bytes/point |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| sampler | asked | points | s | processor s | points/s | x slower | gap / nearest pair | distance spread "
+        "| bytes/point |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         if "error" in row:
-            lines.append(f"| {row['sampler']} | {row['asked']} | - | - | {row['error']} | | | | |")
+            lines.append(f"| {row['sampler']} | {row['asked']} | - | - | - | {row['error']} | | | | |")
             continue
         gap = f"{row['gap_over_min']:.2f}" if row["gap_over_min"] else "-"
         lines.append(
-            f"| {row['sampler']} | {row['asked']:,} | {row['points']:,} | {row['seconds']:.2f} | {row['rate']:,.0f} "
+            f"| {row['sampler']} | {row['asked']:,} | {row['points']:,} | {row['seconds']:.2f} | {row['cpu']:.2f} "
+            f"| {row['rate']:,.0f} "
             f"| {row['slower']:.1f} | {gap} | {row['spread']:.3f} | {row['bytes']:,.0f} |"
         )
     output.with_suffix(".md").write_text("\n".join(lines) + "\n")
@@ -159,21 +168,35 @@ def write(rows: list[dict], output: Path, mesh: Path, area: float) -> None:
     except ImportError:
         print("matplotlib is not installed: no plot")
         return
-    figure, axis = plt.subplots(figsize=(7, 4))
+    figure, (axis, bars) = plt.subplots(1, 2, figsize=(11, 3.8), gridspec_kw={"width_ratios": (3, 2)})
     least = min(row["asked"] for row in rows)
-    for row in rows:
-        if "correlation" in row and row["asked"] == least:
-            axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"])
+    shown = [row for row in rows if "correlation" in row]
+    colors = {name: f"C{i}" for i, name in enumerate(SCRIPTS)}
+    for row in shown:
+        if row["asked"] == least:
+            style = {"lw": 2.2 if row["sampler"].startswith("frazil") else 1.2, "color": colors[row["sampler"]]}
+            axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"], **style)
     axis.set(
-        xlabel="distance / median nearest distance", ylabel="pair correlation", title=f"{mesh.name}, {least:,} points"
+        xlabel="distance / median nearest distance",
+        ylabel="pair correlation",
+        title=f"{mesh}, {least:,} points",
+        ylim=0,
     )
-    axis.legend()
-    figure.savefig(output.with_suffix(".png"), dpi=120, bbox_inches="tight")
+    axis.legend(frameon=False, fontsize=9)
+    bars.barh(
+        [f"{row['sampler']}, {row['asked']:,}" for row in reversed(shown)],
+        [row["rate"] for row in reversed(shown)],
+        color=[colors[row["sampler"]] for row in reversed(shown)],
+    )
+    bars.set(xscale="log", xlabel="points / s")
+    bars.tick_params(axis="y", labelsize=8)
+    figure.tight_layout()
+    figure.savefig(output.with_suffix(".png"), dpi=80)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("mesh", type=Path)
+    parser.add_argument("mesh", type=Path, nargs="?", help="default: the teapot")
     parser.add_argument("--counts", type=int, nargs="+", default=[100_000, 1_000_000])
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--limit", type=float, default=600.0, help="seconds a sampler may take")
@@ -184,7 +207,19 @@ def main() -> None:
 
     from frazil.mesh_io import read_mesh
 
-    mesh = read_mesh(options.mesh)
+    if options.mesh is None:
+        sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
+        from teapot import teapot
+
+        mesh, title = teapot(16), "teapot"
+    else:
+        mesh, title = read_mesh(options.mesh), options.mesh.name
+    rows = measure_all(mesh, title, options)
+    write(rows, options.output, title, mesh.area)
+
+
+def measure_all(mesh, title: str, options: argparse.Namespace) -> list[dict]:
+    """A row for every sampler and count of the options."""
     vertices, faces = mesh.positions.astype(np.float64), mesh.triangles.copy()
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
@@ -206,13 +241,19 @@ def main() -> None:
                 number, seconds = len(got["P"]), float(got["seconds"])
                 rate = number / seconds
                 reference = reference or rate
-                row |= {"points": number, "seconds": seconds, "rate": rate, "slower": reference / rate}
+                row |= {
+                    "points": number,
+                    "seconds": seconds,
+                    "cpu": float(got["cpu"]),
+                    "rate": rate,
+                    "slower": reference / rate,
+                }
                 row |= {"bytes": float(got["peak"] - got["base"]) / number} | measure(got["P"], places)
                 if "A" in got:
                     row["area_error"] = float(abs(got["A"].sum(dtype="f8") / area - 1))
                 rows.append(row)
                 print(f"{name} {count}: {rate:,.0f} points/s", flush=True)
-    write(rows, options.output, options.mesh, area)
+    return rows
 
 
 if __name__ == "__main__":

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dual_contouring import contour, corner_normals
+from frazil.formations.contour import contour, corner_normals
+from frazil.formations.sky import make_sky, write_image
 from ice_body import IceBody, kLower, kUpper
 from scenery import Rock, Snow, make_snowfield
-from sky import make_sky, write_image
 from stage import SceneWriter
 
 kSun = np.array([-0.90, 0.38, -0.42])  # where the sun stands

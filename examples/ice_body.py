@@ -8,7 +8,7 @@ Not: snow, rocks and ground (see scenery.py).
 
 import numpy as np
 
-from noise import Noise, swirl
+from frazil.formations.noise import Noise, swirl
 from spires import Spire, bounds, break_off, distance, make_spire, smooth_min
 
 kLower = np.array([-4.2, -0.4, -3.0])

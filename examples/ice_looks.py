@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 import frazil as fz
-from dual_contouring import Surface, contour, corner_normals
+from frazil.formations.contour import Surface, contour, corner_normals
+from frazil.formations.sky import make_sky
 from frazil.ice import ICE_PRESETS
 from frazil.image import write_png
 from scenery import Rock
-from sky import make_sky
 
 kSun = np.array([-0.75, 0.42, -0.55])  # behind the ice, to the left
 kAges = (0.0, 0.5, 1.0)

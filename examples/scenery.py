@@ -9,9 +9,9 @@ Not: snow that has slid or drifted against walls.
 
 import numpy as np
 
-from dual_contouring import Surface
+from frazil.formations.contour import Surface
+from frazil.formations.noise import Noise, swirl
 from ice_body import IceBody, kLower, kUpper
-from noise import Noise, swirl
 
 kSnowTop = 0.72  # metres above which no snow holds
 kSnowRoot = 0.05  # metres that snow reaches into the ice below

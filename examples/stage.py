@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
-from dual_contouring import Surface
-from sky import write_image
+from frazil.formations.contour import Surface
+from frazil.formations.sky import write_image
 
 kStampKey = "glacier:madeFrom"
 

@@ -60,9 +60,11 @@ _LAZY = {
     "Recipe": ".grade_recipe",
     "ice_preset": ".ice",
     "UsdScene": ".usd",
+    "formations": ".formations",
     "grade": ".grading",
     "bake": ".baking",
     "load_bake": ".baking",
+    "add_motion": ".usd",
     "load_usd": ".usd",
     "match": ".matching",
     "poisson_points": ".points",
@@ -115,6 +117,7 @@ __all__ = [
     "bake",
     "bake_irradiance",
     "bake_occlusion",
+    "formations",
     "fresnel_average",
     "fresnel_dielectric",
     "grade",
@@ -122,6 +125,7 @@ __all__ = [
     "ice_preset",
     "light_groups",
     "load_bake",
+    "add_motion",
     "load_usd",
     "point_occlusion",
     "match",
@@ -138,7 +142,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _LAZY:
-        value = getattr(importlib.import_module(_LAZY[name], __name__), name)
+        module = importlib.import_module(_LAZY[name], __name__)
+        value = module if _LAZY[name] == f".{name}" else getattr(module, name)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'frazil' has no attribute {name!r}")

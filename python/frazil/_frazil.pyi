@@ -48,6 +48,26 @@ class Mesh:
     def set_colors(self, values: numpy.typing.ArrayLike, interpolation: str | None = None) -> None:
         """Give display colours, linear RGB; see set_normals."""
 
+    def set_rest(self, values: numpy.typing.ArrayLike) -> None:
+        """
+        Give positions (V, 3) float32, metres, in a pose that does not move: points are placed there and stay on
+        their triangles in every other pose.
+        """
+
+    def set_spacing(self, values: numpy.typing.ArrayLike) -> None:
+        """
+        Give the spacing (V,) float32 of the points that a render places on this mesh, metres in the world: it takes
+        the place of the material's.
+        """
+
+    @property
+    def spacing(self) -> numpy.ndarray | None:
+        """View of the points' spacing, or None."""
+
+    @property
+    def rest(self) -> numpy.ndarray | None:
+        """View of the rest positions, or None."""
+
     @property
     def normals(self) -> numpy.ndarray | None:
         """View of the normals, or None."""
@@ -144,10 +164,6 @@ class PointSet:
         """
 
     @property
-    def triangle_areas(self) -> NDArray[numpy.float32]:
-        """(N,) float32, m²: the area of each point's triangle, which `on` needs."""
-
-    @property
     def spacing(self) -> float:
         """The distance asked for, metres; the largest where it varies."""
 
@@ -160,10 +176,11 @@ class PointSet:
     def load(path: object) -> PointSet:
         """Read a file that save() wrote. OSError where it cannot be read."""
 
-    def on(self, mesh: Mesh) -> PointSet:
+    def on(self, mesh: Mesh, thin_walls: bool = True) -> PointSet:
         """
-        The same points, with the same ids, on another pose of the mesh that they were made on: positions, normals
-        and areas follow their triangles. ValueError where the pose has fewer triangles.
+        The same points, with the same ids, on another pose of the mesh that they were made on: positions and
+        normals follow their triangles, and each area is the pose's surface that is nearest to the point there.
+        ValueError where the pose has fewer triangles.
         """
 
     def __len__(self) -> int: ...
@@ -1066,12 +1083,18 @@ class Overlay:
     size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.
     feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.
     amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.
-    mask : multiplies the pattern; a constant or a TextureLookup.
+    mask : multiplies the pattern; a constant or a TextureLookup. name : of its layers in a picture.
 
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, pattern: str = 'solid', *, color: Sequence[float] = [0.8999999761581421, 0.949999988079071, 1.0], opacity: float = 1.0, roughness: float = 0.5, scattering: float = 0.699999988079071, bump: float = 0.0, internal: float = 0.0, age_begin: float = 0.0, age_end: float = 1.0, size: float = 0.30000001192092896, width: float = 0.004000000189989805, feather: float = 0.004000000189989805, warp: float = 0.20000000298023224, scales: int = 2, amount: float = 0.5, slope: float = 0.0, direction: Sequence[float] = [0.0, 1.0, 0.0], seed: int = 0, mask: TextureLookup | float = 1.0) -> None: ...
+    def __init__(self, pattern: str = 'solid', *, color: Sequence[float] = [0.8999999761581421, 0.949999988079071, 1.0], opacity: float = 1.0, roughness: float = 0.5, scattering: float = 0.699999988079071, bump: float = 0.0, internal: float = 0.0, age_begin: float = 0.0, age_end: float = 1.0, size: float = 0.30000001192092896, width: float = 0.004000000189989805, feather: float = 0.004000000189989805, warp: float = 0.20000000298023224, scales: int = 2, amount: float = 0.5, slope: float = 0.0, direction: Sequence[float] = [0.0, 1.0, 0.0], seed: int = 0, mask: TextureLookup | float = 1.0, name: str = '') -> None: ...
+
+    @property
+    def name(self) -> str: ...
+
+    @name.setter
+    def name(self, arg: str, /) -> None: ...
 
     @property
     def pattern(self) -> str: ...
@@ -1213,12 +1236,12 @@ class IceMaterial:
     profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.
     compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;
         compensation_strength in [0, 1].
-    spacing : of the points, metres; 0 = from the mean free path.
+    spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's vertices.
 
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -1231,6 +1254,12 @@ class IceMaterial:
 
     @tint.setter
     def tint(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def spacing(self) -> TextureLookup | float: ...
+
+    @spacing.setter
+    def spacing(self, arg: TextureLookup | float, /) -> None: ...
 
     @property
     def medium(self) -> Medium: ...
@@ -1291,12 +1320,6 @@ class IceMaterial:
 
     @age.setter
     def age(self, arg: float, /) -> None: ...
-
-    @property
-    def spacing(self) -> float: ...
-
-    @spacing.setter
-    def spacing(self, arg: float, /) -> None: ...
 
     @property
     def ramp_distances(self) -> list[float]: ...
@@ -1500,6 +1523,18 @@ class Scene:
     @property
     def lights(self) -> list[Light]: ...
 
+    def set_motion(self, next: Scene) -> None:
+        """
+        Tell how the scene goes on, by the same scene a frame later: for the AOV motion. Objects are paired by path.
+        """
+
+    @property
+    def motion(self) -> dict | None:
+        """
+        What set_motion told: (4, 4) matrices of the objects, (V, 3) positions of the meshes (empty where they stay)
+        and the camera; None without.
+        """
+
     def __repr__(self) -> str: ...
 
 class RenderOptions:
@@ -1566,6 +1601,12 @@ class RenderOptions:
 
     @spacing_scale.setter
     def spacing_scale(self, arg: float, /) -> None: ...
+
+    @property
+    def spacing_pixels(self) -> float: ...
+
+    @spacing_pixels.setter
+    def spacing_pixels(self, arg: float, /) -> None: ...
 
     @property
     def bake_samples(self) -> int: ...
@@ -1683,6 +1724,12 @@ class RenderResult:
     @property
     def compensations(self) -> list:
         """list of dict, one per material of ice: material, mode, strength."""
+
+    @property
+    def overlays(self) -> list:
+        """
+        list of dict, one per overlay that has layers: name, material, opacity, age, age_begin, age_end.
+        """
 
     @property
     def stats(self) -> dict:

@@ -50,7 +50,8 @@ def chosen_aovs(names: Iterable[str]) -> list[str]:
 
 
 def layers_of(names: Iterable[str], film: Mapping[str, Any]) -> list[str]:
-    """The layers of a film that AOVs stand for: themselves, and by light group, knot of a ramp, rank of a Cryptomatte.
+    """The layers of a film that AOVs stand for: themselves, and by light group, knot of a ramp, rank of a Cryptomatte;
+    with ramps and compensations, what is seen of that ice by way of other lobes.
 
     Raises
     ------
@@ -61,7 +62,13 @@ def layers_of(names: Iterable[str], film: Mapping[str, Any]) -> list[str]:
     tails = ["", *(f"_{group}" for group in groups)]
     layers: dict[str, None] = {}
     for name in names:
-        pattern = re.compile(re.escape(name) + r"\d*(" + "|".join(map(re.escape, tails)) + ")")
+        # Ramps and compensations come with the light of ice that is seen by way of other lobes.
+        own_name = re.escape(name)
+        if name.startswith(("translucency_ramp", "compensation_")):
+            own_name = f"(?:indirect_)?{own_name}|indirect_translucency"
+        if name == "overlay":
+            own_name = r"overlay_\w+"
+        pattern = re.compile(rf"(?:{own_name})\d*({'|'.join(map(re.escape, tails))})")
         own = [layer for layer in film if pattern.fullmatch(layer)]
         if not own:
             raise KeyError(unknown_name("Film: layer", name, list(film)))

@@ -39,6 +39,7 @@ BAKE_OPTIONS = (
     "seed",
     "spacing",
     "spacing_scale",
+    "spacing_pixels",
     "bake_samples",
     "bake_error",
     "bake_bounces",
@@ -46,6 +47,10 @@ BAKE_OPTIONS = (
     "tolerance",
     "estimator",
 )
+# What else the core wants to know; bits depend on the picture's size by way of spacing_pixels alone.
+BAKE_FREE_OPTIONS = ("threads", "width", "height")
+# Properties of ice that change what is seen of it, not what bounces.
+_ONLY_SEEN = ("ramp_", "compensation")
 
 
 @dataclass
@@ -185,7 +190,7 @@ def load_bake(path: str | os.PathLike) -> Bake:
 
 def _bake(scene: Any, options: dict[str, Any], known: Bake | None, progress: Progress | None) -> Any:
     core = _frazil.RenderOptions()
-    for name in (*BAKE_OPTIONS, "threads"):
+    for name in (*BAKE_OPTIONS, *BAKE_FREE_OPTIONS):
         if name in options:
             setattr(core, name, options[name])
     result = run_stoppable(lambda report: _frazil.bake(scene, core, known=known, progress=report), progress)
@@ -198,12 +203,15 @@ def _hashes(scene: Any, options: dict[str, Any]) -> dict[str, Any]:
     """What the parts of a bake were made of: one text for the points, one per light group."""
     defaults = _frazil.RenderOptions()
     chosen = {name: options.get(name, getattr(defaults, name)) for name in BAKE_OPTIONS}
-    shapes = scene_hash(scene)
+    shapes = scene_hash(scene, _ONLY_SEEN)
+    if chosen["spacing_pixels"] > 0:
+        size = [options.get(name, getattr(defaults, name)) for name in ("width", "height")]
+        shapes = content_hash(shapes, scene.camera, size)
     groups = {
         group: content_hash(shapes, chosen, [light for light in scene.lights if light.group == group])
         for group in _frazil.light_groups(scene.lights)
     }
-    placing = {name: chosen[name] for name in ("seed", "spacing", "spacing_scale")}
+    placing = {name: chosen[name] for name in ("seed", "spacing", "spacing_scale", "spacing_pixels")}
     return {"points": content_hash(shapes, placing), "groups": groups}
 
 

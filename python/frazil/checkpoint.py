@@ -34,7 +34,7 @@ class Checkpoint:
     def __init__(self, path: str | os.PathLike, scene: Any, options: dict[str, Any]):
         self.path = Path(path)
         chosen = {name: value for name, value in options.items() if name != "threads"}
-        self._key = content_hash(scene_hash(scene), scene.lights, scene.camera, chosen)
+        self._key = content_hash(scene_hash(scene), scene.lights, scene.camera, scene.motion, chosen)
 
     def save(self, state: dict[str, np.ndarray]) -> None:
         """Write the state, whole or not at all."""

@@ -7,7 +7,7 @@ Not: paths of files; a file that was written anew with the same content counts a
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,13 +30,19 @@ def content_hash(*values: Any) -> str:
     return digest.hexdigest()
 
 
-def scene_hash(scene: Any) -> str:
-    """The content of what light meets: meshes, materials, placements. Neither lights nor camera."""
+def scene_hash(scene: Any, leaving_out: Sequence[str] = ()) -> str:
+    """The content of what light meets: meshes, materials, placements; neither lights nor camera.
+
+    Properties of materials whose names begin as `leaving_out` says do not count.
+    """
     meshes = [content_hash(scene.mesh(i)) for i in range(len(scene.mesh_paths))]
-    return content_hash(version(), meshes, scene.materials, scene.objects)
+    digest = hashlib.blake2b(digest_size=16)
+    _feed(digest, (version(), meshes, scene.objects))
+    _feed(digest, scene.materials, tuple(leaving_out))
+    return digest.hexdigest()
 
 
-def _feed(digest: Any, value: Any) -> None:
+def _feed(digest: Any, value: Any, leaving_out: tuple[str, ...] = ()) -> None:
     if value is None or isinstance(value, bool | int | float | str | bytes | np.generic):
         digest.update(f"{type(value).__name__}:{value!r};".encode())
     elif isinstance(value, np.ndarray):
@@ -44,19 +50,21 @@ def _feed(digest: Any, value: Any) -> None:
         digest.update(np.ascontiguousarray(value).data)
     elif isinstance(value, Mapping):
         for key in sorted(value):
-            _feed(digest, (key, value[key]))
+            _feed(digest, (key, value[key]), leaving_out)
     elif isinstance(value, list | tuple | set | frozenset):
         digest.update(f"{len(value)}[".encode())
         for item in sorted(value) if isinstance(value, set | frozenset) else value:
-            _feed(digest, item)
+            _feed(digest, item, leaving_out)
     else:
         names = _properties(type(value))
         if not names:
             raise TypeError(f"content_hash: value must have public properties, got {type(value).__name__}.")
         digest.update(f"{type(value).__name__}(".encode())
         for name in names:
+            if name.startswith(leaving_out):
+                continue
             digest.update(f"{name}=".encode())
-            _feed(digest, getattr(value, name))
+            _feed(digest, getattr(value, name), leaving_out)
 
 
 def _properties(kind: type) -> list[str]:

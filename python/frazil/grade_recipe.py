@@ -1,6 +1,7 @@
 """Recipes: what `frazil grade` changes about a picture, from TOML or a dict, checked key by key.
 
-Model: tables `lights`, `components`, `ramp`, `compensation`, `color` and `mattes`; docs/grading.md lists every key.
+Model: tables `lights`, `components`, `ramp`, `compensation`, `overlays`, `color` and `mattes`; docs/grading.md lists
+every key.
 Units: intensities and colours are factors, exposure is in stops, temperature in kelvin.
 Valid: all numbers finite; an unknown key is refused with the nearest that there is.
 Not: whether the picture has the layers: grading.py.
@@ -36,7 +37,7 @@ __all__ = [
     "recipe_text",
 ]
 
-MODES = ("off", "ratio", "conserve", "fill", "linear")
+MODES = ("off", "ratio", "conserve", "depth", "fill", "linear")
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,8 @@ class Recipe:
     components: dict[str, Mix] = field(default_factory=dict)
     ramp: dict[str, RampChange] = field(default_factory=dict)  # by material; "" = the only one that has a ramp
     compensation: Compensation | None = None
+    age: float | None = None  # of all overlays, 0..1; None = as rendered
+    overlays: dict[str, float] = field(default_factory=dict)  # factor of opacity by the overlay's name
     color: ColorCorrection = ColorCorrection()
     mattes: dict[str, Matte] = field(default_factory=dict)
 
@@ -171,7 +174,7 @@ def _toml_value(value: Any) -> str:
 def _recipe(table: Mapping[str, Any], name: str) -> Recipe:
     at = f"{name}: "
     table = _american(table)
-    _refuse_unknown(table, at, ("lights", "components", "ramp", "compensation", "color", "mattes"))
+    _refuse_unknown(table, at, ("lights", "components", "ramp", "compensation", "overlays", "color", "mattes"))
     lights, light_components = {}, {}
     components = _component_names()
     for group, entry in _tables(table, "lights", at).items():
@@ -192,6 +195,7 @@ def _recipe(table: Mapping[str, Any], name: str) -> Recipe:
         {component: _mix(_american(entry), f"{at}components.{component}") for component, entry in mixes.items()},
         _ramps(_table(table.get("ramp", {}), f"{at}ramp"), f"{at}ramp"),
         _compensation(table["compensation"], f"{at}compensation") if "compensation" in table else None,
+        *_overlays(_table(table.get("overlays", {}), f"{at}overlays"), f"{at}overlays"),
         _correction(_table(table.get("color", {}), f"{at}color"), f"{at}color"),
         {key: _matte(entry, f"{at}mattes.{key}") for key, entry in _tables(table, "mattes", at).items()},
     )
@@ -248,6 +252,19 @@ def _compensation(table: Any, at: str) -> Compensation:
         raise ValueError(f"{at}.mode: must be one of {', '.join(MODES)}, got {mode!r}.{_nearest(str(mode), MODES)}")
     strength = _number(table, "strength", at, 1.0, 0.0, 1.0) if "strength" in table else None
     return Compensation(mode, strength)
+
+
+def _overlays(table: Mapping[str, Any], at: str) -> tuple[float | None, dict[str, float]]:
+    """The age of all overlays, and the factor of each one's opacity."""
+    age = _number(table, "age", at, 0.0, 0.0, 1.0) if "age" in table else None
+    factors = {}
+    for name, entry in table.items():
+        if name == "age":
+            continue
+        entry = _table(entry, f"{at}.{name}")
+        _refuse_unknown(entry, f"{at}.{name}.", ("opacity",))
+        factors[name] = _number(entry, "opacity", f"{at}.{name}", 1.0, 0.0)
+    return age, factors
 
 
 _CORRECTION_KEYS = ("exposure", "gain", "temperature", "saturation", "gamma")

@@ -15,13 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from .aovs import aov_table
+from .aovs import aov_table, unknown_name
 from .film import Film
 from .grade_color import correct
 from .grade_recipe import MODES, Compensation, Matte, RampChange, Recipe, read_recipe
 from .warning import FrazilWarning
 
 __all__ = ["Lights", "grade"]
+
+# Layers of what a change of an overlay's opacity changes, and the component that each belongs to. An overlay tints the
+# light that leaves the core and takes from what enters it: the product goes with the square of the change.
+OVERLAY_PARTS = {
+    "diffuse": "diffuse",
+    "translucency": "translucency",
+    "refraction": "refraction",
+    "volume": "volume",
+    "squared": "translucency",
+}
 
 
 def grade(
@@ -99,50 +109,66 @@ class Lights:
         self.components = [name for name in expected if name in film]
         self.is_complete = len(self.components) == len(expected) or not film.metadata
         self.knots = _json(film, "frazil:ramp_knots") or []
+        self.overlays = _json(film, "frazil:overlays") or []
         self.names = self._names_of_light()
         self._refuse_what_is_missing()
 
     def beauty(self) -> np.ndarray:
         """(H, W, 3) float32: the sum of all light, graded."""
         terms = self.terms()
-        if all(np.all(weight == 1.0) for _, weight in terms):
+        adds_layers = self._changes_translucency or self._overlay_terms()
+        if not adds_layers and all(np.all(weight == 1.0) for _, weight in terms):
             return self.film["beauty"][:, :, :3].astype(np.float32)
         if self.is_complete:
-            return self._sum(terms)
+            return self._with_overlaps(self._sum(terms))
         # Some components are not in the file: what changes is added to the beauty.
-        changed = self._sum([(name, weight - 1.0) for name, weight in terms if np.any(weight != 1.0)])
+        changes: list[tuple[str, np.ndarray]] = []
+        for component in self.components:
+            own = self._terms_of(component)
+            if any(np.any(weight != 1.0) for _, weight in own):
+                changes += [*own, (component, -np.ones(3))]
+        changed = self._sum(changes + self._indirect_terms() + self._overlay_terms())
         changed += self.film["beauty"][:, :, :3]
-        return changed
+        return self._with_overlaps(changed)
 
     def terms(self) -> list[tuple[str, np.ndarray]]:
         """The layers that sum to the graded beauty, each with its (3,) weight."""
-        terms: list[tuple[str, np.ndarray]] = []
-        for component in self.components:
-            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
-                terms += self._translucency_terms()
-            else:
-                terms += self._terms(component)
-        return terms
+        terms = [term for component in self.components for term in self._terms_of(component)]
+        return terms + self._indirect_terms() + self._overlay_terms()
+
+    def _terms_of(self, component: str) -> list[tuple[str, np.ndarray]]:
+        if component == "translucency" and self._changes_translucency:
+            return self._translucency_terms()
+        return self._terms(component)
+
+    @property
+    def _changes_translucency(self) -> bool:
+        return bool(self.recipe.ramp or self.recipe.compensation)
 
     def graded_layers(self) -> dict[str, np.ndarray]:
-        """Every additive layer and plane of translucency, graded."""
+        """Every additive layer, graded. What changes of ice that is seen by way of other lobes is in `refraction`."""
         layers = {}
         for component in self.components:
-            terms = self._terms(component)
-            if component == "translucency" and (self.recipe.ramp or self.recipe.compensation):
+            if component == "translucency" and self._changes_translucency:
                 layers |= self._graded_translucency()
                 continue
-            layers[component] = self._sum(terms)
-            layers |= {
-                name: self._sum([(name, weight)]) for name, weight in self._parts(component) if name != component
-            }
+            for group, name in self._part_names(component).items():
+                terms = [(name, self._weight(group, component)), *self._overlay_terms(component, group)]
+                if component == "refraction":
+                    terms += self._indirect_terms(only=group)
+                layers[name] = self._with_overlaps(self._sum(terms), component, group)
+            if component not in layers:
+                terms = self._terms(component) + self._overlay_terms(component)
+                terms += self._indirect_terms() if component == "refraction" else []
+                layers[component] = self._with_overlaps(self._sum(terms), component)
         return layers
 
     def _graded_translucency(self) -> dict[str, np.ndarray]:
         names = self._part_names("translucency")
         parts = {}
         for group, name in names.items():
-            parts[name] = self._sum(self._translucency_terms(only=group))
+            terms = self._translucency_terms(only=group) + self._overlay_terms("translucency", group)
+            parts[name] = self._with_overlaps(self._sum(terms), "translucency", group)
         if len(names) > 1:
             parts["translucency"] = sum(parts.values())
         return parts
@@ -194,13 +220,28 @@ class Lights:
                 "grade: ramp and compensation must not be changed in one recipe: their product is not in the layers. "
                 "Render with the new compensation."
             )
-        shares = self._ramp_shares() if self.recipe.ramp else self._compensation_shares()
         return [
             (name, self._weight(group, "translucency") * share)
-            for layer, share in shares
+            for layer, share in self._translucency_shares()
             for group, name in self._part_names(layer).items()
             if only is None or group == only
         ]
+
+    def _indirect_terms(self, only: str | None = None) -> list[tuple[str, np.ndarray]]:
+        """What changes where ice is seen by way of other lobes: of their weights, the mean."""
+        if not self._changes_translucency or "indirect_translucency" not in self.film:
+            return []
+        shares = [*self._translucency_shares(), ("translucency", -np.ones(3))]
+        lobes = ("diffuse", "specular", "refraction")
+        return [
+            (name, np.mean([self._weight(group, lobe) for lobe in lobes], axis=0) * share)
+            for layer, share in shares
+            for group, name in self._part_names(f"indirect_{layer}").items()
+            if only is None or group == only
+        ]
+
+    def _translucency_shares(self) -> list[tuple[str, np.ndarray]]:
+        return self._ramp_shares() if self.recipe.ramp else self._compensation_shares()
 
     def _ramp_shares(self) -> list[tuple[str, np.ndarray]]:
         """Every knot layer and the colour that it gets."""
@@ -251,6 +292,94 @@ class Lights:
             shares = [("translucency", relative * ones), ("compensation_off", (1.0 - relative) * ones)]
         return [(name, share) for name, share in shares if np.any(share != 0.0)]
 
+    # ---- overlays ----
+
+    def _overlay_terms(self, component: str | None = None, only: str | None = None) -> list[tuple[str, np.ndarray]]:
+        """What the changes of the overlays' opacities add: to one component and light group, or to all."""
+        terms = []
+        for overlay, factor in self._overlay_factors().items():
+            for part, of in OVERLAY_PARTS.items():
+                layer = f"overlay_{overlay}_{part}"
+                if factor == 1.0 or component not in (None, of) or layer not in self.film:
+                    continue
+                change = (factor - 1.0) ** (2 if part == "squared" else 1)
+                terms += [
+                    (name, self._weight(group, of) * change)
+                    for group, name in self._part_names(layer).items()
+                    if only is None or group == only
+                ]
+        return terms
+
+    def _with_overlaps(self, light: np.ndarray, component: str | None = None, only: str | None = None) -> np.ndarray:
+        """The light, and what several overlays that change change together: in place.
+
+        Overlays that lie over one another multiply what they leave of the light from below. Each one's own change is in
+        `_overlay_terms`; the product of what all leave is more or less than their sum.
+        """
+        factors = {name: factor for name, factor in self._overlay_factors().items() if factor != 1.0}
+        if len(factors) < 2:
+            return light
+        for part in (component,) if component else ("translucency", "refraction", "volume"):
+            if part not in ("translucency", "refraction", "volume") or part not in self.film:
+                continue
+            for group, name in self._part_names(part).items():
+                if only is None or group == only:
+                    light += self._overlap(factors, part, name) * self._weight(group, part).astype(np.float32)
+        return light
+
+    def _overlap(self, factors: Mapping[str, float], part: str, layer: str) -> np.ndarray:
+        """By how much the product of the overlays' changes differs from their sum, for one layer."""
+        rendered = self.film[layer].astype(np.float32)
+        is_lit = np.abs(rendered) > 1e-6
+        product, total = np.ones_like(rendered), np.ones_like(rendered)
+        for overlay, factor in factors.items():
+            change = self._change(overlay, part, layer) * np.float32(factor - 1.0)
+            if part == "translucency":
+                change += self._change(overlay, "squared", layer) * np.float32((factor - 1.0) ** 2)
+            relative = np.divide(change, rendered, out=np.zeros_like(change), where=is_lit)
+            product *= np.clip(1.0 + relative, 0.0, 1e3)
+            total += relative
+        return (product - total) * rendered
+
+    def _change(self, overlay: str, part: str, layer: str) -> np.ndarray:
+        """The change by an overlay that belongs to a component's layer; 0 where the picture lacks it."""
+        name = f"overlay_{overlay}_{part}" + layer[len("translucency" if part == "squared" else part) :]
+        return self.film[name].astype(np.float32) if name in self.film else np.zeros_like(self.film[layer], np.float32)
+
+    def _overlay_factors(self) -> dict[str, float]:
+        """By what the opacity of each overlay is multiplied; refused where it would leave 0..1."""
+        recipe = self.recipe
+        if recipe.age is None and not recipe.overlays:
+            return {}
+        known = list(dict.fromkeys(row["name"] for row in self.overlays))
+        for name in recipe.overlays:
+            if name not in known:
+                raise ValueError(unknown_name("grade: overlays", name, known or ["none: no ice has overlays"]))
+        factors: dict[str, float] = {}
+        for row in self.overlays:
+            name, rendered = row["name"], _age_weight(row, row["age"])
+            factor = recipe.overlays.get(name, 1.0)
+            if recipe.age is not None:
+                wanted = _age_weight(row, recipe.age)
+                if rendered == 0.0 and wanted > 0.0:
+                    raise ValueError(
+                        f"grade: overlays.age must be at most {row['age_begin']:g}, where {name} of {row['material']} "
+                        f"begins, got {recipe.age:g}: at the rendered age {row['age']:g} it is not in the picture. "
+                        "Render at a greater age."
+                    )
+                factor *= wanted / rendered if rendered > 0.0 else 1.0
+            if factor * rendered * row["opacity"] > 1.0 + 1e-6:
+                raise ValueError(
+                    f"grade: overlays.{name}.opacity must be <= {1.0 / (rendered * row['opacity']):g}, got {factor:g}: "
+                    f"it was rendered with opacity {rendered * row['opacity']:g}."
+                )
+            if factors.setdefault(name, factor) != factor:
+                raise ValueError(
+                    f"grade: overlays.age must change {name} of all materials alike, as they share its layers. "
+                    "Give overlays of different ages names of their own."
+                )
+        return factors
+
     # ---- what the film must have ----
 
     def _names_of_light(self) -> set[str]:
@@ -258,6 +387,8 @@ class Lights:
         tops = set(self.components)
         tops |= {f"translucency_ramp{k}" for k in range(len(self.knots))}
         tops |= {f"compensation_{mode}" for mode in MODES}
+        tops |= {f"indirect_{top}" for top in tops}
+        tops |= {f"overlay_{row['name']}_{part}" for row in self.overlays for part in OVERLAY_PARTS}
         names = tops | {f"{top}_{group}" for top in tops for group in self.groups}
         return {name for name in names if name in self.film}
 
@@ -294,9 +425,27 @@ class Lights:
             for name, _ in self._compensation_shares():
                 self._require(name, f"--aov {name}")
 
+        if (recipe.overlays or recipe.age is not None) and not self.overlays:
+            raise ValueError(
+                "grade: layers overlay_... must be in the picture, are missing. Render ice that has overlays with "
+                "--aov all,overlay."
+            )
+        for name, factor in self._overlay_factors().items():
+            if factor != 1.0:
+                self._require(f"overlay_{name}_diffuse", "--aov all,overlay")
+
     def _require(self, name: str, option: str) -> None:
         if name not in self.film:
             raise ValueError(f"grade: layer {name} must be in the picture, is missing. Render with {option}.")
+
+
+def _age_weight(overlay: Mapping[str, Any], age: float) -> float:
+    """How much of its opacity an overlay has at an age: a smooth step (material/overlay.cpp)."""
+    begin, end = overlay["age_begin"], overlay["age_end"]
+    if age >= end:
+        return 1.0
+    t = max(0.0, (age - begin) / (end - begin))
+    return t * t * (3.0 - 2.0 * t)
 
 
 def _rgb(film: Film, name: str) -> np.ndarray:

@@ -187,7 +187,7 @@ def preset_overlays(preset: IcePreset, scale: float = 1.0, **changes: Any) -> li
     """The preset's overlays, lengths times `scale`; `changes` are arguments of every Overlay."""
     made = []
     for row in preset.overlays:
-        overlay = Overlay(**(row | changes))
+        overlay = Overlay(**({"name": row["pattern"]} | row | changes))
         for name in _LENGTHS:
             setattr(overlay, name, getattr(overlay, name) * scale)
         made.append(overlay)

@@ -471,6 +471,28 @@ def read_picture(path: str | os.PathLike, *, is_data: bool = False) -> np.ndarra
     OSError
         Naming `path`, for a file that is missing, truncated or no image.
     """
+    pixels, levels = _read_colors(path)
+    return pixels if is_data or levels == 0 else _from_srgb(pixels)
+
+
+def read_picture_steps(path: str | os.PathLike) -> np.ndarray | None:
+    """How exactly a picture's file tells each value of `read_picture`: the width of one of its levels in linear light.
+
+    Returns
+    -------
+    (H, W, 3) float32 or None
+        Infinity where the value is the lowest or highest that the file can hold; None for files of floats.
+    """
+    pixels, levels = _read_colors(path)
+    if levels == 0:
+        return None
+    slope = np.where(pixels <= 0.04045, 1.0 / 12.92, 2.4 / 1.055 * ((pixels + 0.055) / 1.055) ** 1.4)
+    is_cut = (pixels < 0.5 / levels) | (pixels > 1.0 - 0.5 / levels)
+    return np.where(is_cut, np.inf, slope / levels).astype(np.float32)
+
+
+def _read_colors(path: str | os.PathLike) -> tuple[np.ndarray, int]:
+    """(H, W, 3) float32 as they are in the file, and the number of the highest level; 0 for floats."""
     with _opened(path) as source:
         spec = source.spec()
         pixels = source.read_image("float")
@@ -480,6 +502,9 @@ def read_picture(path: str | os.PathLike, *, is_data: bool = False) -> np.ndarra
     if {"R", "G", "B"} <= set(spec.channelnames):
         pixels = pixels[:, :, [spec.channelnames.index(name) for name in "RGB"]]
     pixels = pixels[:, :, :3] if pixels.shape[2] >= 3 else np.repeat(pixels[:, :, :1], 3, axis=2)
-    if is_data or str(spec.format) in ("half", "float", "double"):
-        return np.ascontiguousarray(pixels)
+    levels = 0 if str(spec.format) in ("half", "float", "double") else 2 ** (8 * spec.format.size()) - 1
+    return np.ascontiguousarray(pixels), levels
+
+
+def _from_srgb(pixels: np.ndarray) -> np.ndarray:
     return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4).astype(np.float32)

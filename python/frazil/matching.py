@@ -23,6 +23,7 @@ __all__ = ["Match", "match"]
 
 WHAT = ("lights", "ramp", "gain")
 _ROUNDS = 20  # of lights and ramp in turn
+_MOST_LEVELS = 20_000  # values that are asked to round to the file's
 _MOST_PIXELS = 200_000  # that take part; more tell nothing new about a handful of factors
 
 
@@ -81,7 +82,7 @@ def match(
             raise ValueError(f"match: what must be of {', '.join(WHAT)}, got {name!r}.")
     if "gain" in what and "lights" in what:
         raise ValueError("match: what must not have both lights and gain: lights give any gain.")
-    target = _picture(reference)
+    target, steps = _picture(reference)
     size = (film.height, film.width)
     if target.shape[:2] != size:
         raise ValueError(_other_size("reference", target.shape, size))
@@ -95,7 +96,13 @@ def match(
     chosen = chosen[:: max(1, len(chosen) // _MOST_PIXELS)]
 
     problem = _Problem(
-        film, target.reshape(-1, 3)[chosen], weights.ravel()[chosen], chosen, allow_negative, per_channel
+        film,
+        target.reshape(-1, 3)[chosen],
+        _confidence(weights, steps)[chosen],
+        None if steps is None else steps.reshape(-1, 3)[chosen].astype(np.float64),
+        chosen,
+        allow_negative,
+        per_channel,
     )
     recipe: dict[str, Any] = {}
     last = np.inf
@@ -108,6 +115,7 @@ def match(
         if not error < last * (1.0 - 1e-6):
             break
         last = error
+    recipe = problem.refine(recipe)
     if "gain" in what:
         recipe |= problem.fit_gain(recipe)
 
@@ -125,9 +133,10 @@ def match(
 class _Problem:
     """Least squares over the chosen pixels."""
 
-    def __init__(self, film, target, weights, chosen, allow_negative, per_channel):
+    def __init__(self, film, target, weights, steps, chosen, allow_negative, per_channel):
         self.film, self.target, self.chosen = film, target.astype(np.float64), chosen
-        self.root = np.sqrt(weights.astype(np.float64))[:, None]
+        self.root = np.sqrt(weights.astype(np.float64))  # (pixels, 3)
+        self.steps = steps  # (pixels, 3): widths of the file's levels; None where it is exact
         self.allow_negative, self.per_channel = allow_negative, per_channel
         self._pixels: dict[str, np.ndarray] = {}
 
@@ -149,15 +158,19 @@ class _Problem:
 
     def fit_lights(self, recipe: dict[str, Any]) -> dict[str, Any]:
         """Factors of all groups together, the ramp as it is in the recipe."""
+        columns, target, groups = self._light_columns(recipe)
+        factors = self._solve(columns, target, self.allow_negative)
+        return {"lights": {group: _mix_of(factor) for group, factor in zip(groups, factors, strict=True)}}
+
+    def _light_columns(self, recipe: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, list[str]]:
+        """(groups, pixels, 3): the picture of each light group alone; what they shall sum to."""
         fixed = {key: value for key, value in recipe.items() if key != "lights"}
         groups = Lights(self.film, fixed).groups
         columns = []
         for group in groups:
-            # The picture of this light alone.
             off = {"lights": {other: {"intensity": 0.0} for other in groups if other != group}}
             columns.append(self.sum(Lights(self.film, fixed | off).terms()))
-        factors = self._solve(np.stack(columns), self.target, self.allow_negative)
-        return {"lights": {group: _mix_of(factor) for group, factor in zip(groups, factors, strict=True)}}
+        return np.stack(columns), self.target, groups
 
     def fit_ramp(self, recipe: dict[str, Any]) -> dict[str, Any]:
         """Colours of the knots of all ramps, energy not preserved, the lights as they are in the recipe."""
@@ -194,6 +207,30 @@ class _Problem:
         factors = _least_squares(columns.reshape(len(columns), -1).T, target.ravel(), allow_negative)
         return np.repeat(factors[:, None], 3, axis=1)
 
+    def refine(self, recipe: dict[str, Any]) -> dict[str, Any]:
+        """A recipe whose picture rounds to the reference everywhere, where there is one; else the recipe as it is.
+
+        Rounding errors of a light's smooth regions are all alike: least squares take them for light. That every value
+        must round to the file's tells faint lights many times more exactly: a linear program.
+        """
+        if self.steps is None or "lights" not in recipe:
+            return recipe
+        columns, target, groups = self._light_columns(recipe)
+        factors = []
+        steps = np.broadcast_to(self.steps, self.target.shape)
+        rows = [(columns[:, :, c].T, target[:, c], steps[:, c]) for c in range(3)]
+        if not self.per_channel:
+            rows = [tuple(np.concatenate([row[i] for row in rows]) for i in range(3))]
+        for matrix, values, step in rows:
+            known = np.flatnonzero(np.isfinite(step) & (step > 0.0))
+            known = known[:: max(1, len(known) // _MOST_LEVELS)]
+            solved = _within_steps(matrix[known], values[known], step[known], self.allow_negative)
+            if solved is None:
+                return recipe
+            factors.append(solved)
+        factors = np.stack(factors * (1 if self.per_channel else 3), axis=1)
+        return recipe | {"lights": {group: _mix_of(factor) for group, factor in zip(groups, factors, strict=True)}}
+
 
 def _least_squares(matrix: np.ndarray, target: np.ndarray, allow_negative: bool) -> np.ndarray:
     """Factors of the columns; 1 for columns that are empty."""
@@ -209,6 +246,35 @@ def _least_squares(matrix: np.ndarray, target: np.ndarray, allow_negative: bool)
     right = rotation.T @ target
     solved = np.linalg.lstsq(triangle, right, rcond=1e-6)[0] if allow_negative else nnls(triangle, right)[0]
     factors[used] = solved / size[used]
+    return factors
+
+
+def _within_steps(matrix: np.ndarray, target: np.ndarray, step: np.ndarray, allow_negative: bool) -> np.ndarray | None:
+    """The factors whose sum keeps farthest from the ends of every value's level; None where no factors stay within."""
+    from scipy.optimize import linprog
+
+    size = np.abs(matrix).max(axis=0, initial=0.0)
+    used = np.flatnonzero(size > 1e-9 * max(size.max(initial=0.0), 1e-30))
+    if len(used) == 0 or len(matrix) <= len(used):
+        return None
+    rows, values = matrix[:, used] / size[used] / step[:, None], target / step
+    # The rows that no least squares miss by a level; a painting of its own does by many.
+    start = np.linalg.lstsq(rows, values, rcond=None)[0]
+    if np.quantile(np.abs(rows @ start - values), 0.99) > 1.0:
+        return None
+    ones = np.ones((len(rows), 1))
+    solved = linprog(
+        np.append(np.zeros(len(used)), 1.0),
+        A_ub=np.block([[rows, -ones], [-rows, -ones]]),
+        b_ub=np.concatenate([values, -values]),
+        bounds=[(None if allow_negative else 0.0, None)] * len(used) + [(0.0, None)],
+        method="highs",
+    )
+    # Half a level, and what layers of half floats have lost.
+    if not solved.success or solved.x[-1] > 0.75:
+        return None
+    factors = np.ones(matrix.shape[1])
+    factors[used] = solved.x[:-1] / size[used]
     return factors
 
 
@@ -234,15 +300,30 @@ def _ramps(knots: Sequence[dict[str, Any]], colors: np.ndarray) -> dict[str, Any
 # ---- pictures --------------------------------------------------------------------------------------------------------
 
 
-def _picture(source: "np.ndarray | str | os.PathLike") -> np.ndarray:
-    """(H, W, 3) float32, linear."""
+def _picture(source: "np.ndarray | str | os.PathLike") -> tuple[np.ndarray, np.ndarray | None]:
+    """(H, W, 3) float32, linear, and how exactly the file tells its values."""
     if isinstance(source, np.ndarray):
         if source.ndim != 3 or source.shape[2] < 3:
             raise ValueError(f"match: reference must be of shape (H, W, 3), got {source.shape}.")
-        return source[:, :, :3].astype(np.float32)
-    from .image import read_picture
+        return source[:, :, :3].astype(np.float32), None
+    from .image import read_picture, read_picture_steps
 
-    return read_picture(source)
+    return read_picture(source), read_picture_steps(source)
+
+
+def _confidence(weights: np.ndarray, steps: np.ndarray | None) -> np.ndarray:
+    """(pixels, 3): how much each value counts.
+
+    A file of whole numbers tells dark values more exactly than bright ones, and of those at its ends only that they are
+    beyond; least squares then are those of the values as encoded.
+    """
+    values = np.repeat(weights.reshape(-1, 1).astype(np.float64), 3, axis=1)
+    if steps is None:
+        return values
+    exactness = 1.0 / np.maximum(steps.reshape(-1, 3).astype(np.float64), 1e-30) ** 2
+    if not np.any(exactness * values):
+        return values  # nothing but ends: better than no answer
+    return values * exactness / exactness.max()
 
 
 def _mask(source: "np.ndarray | str | os.PathLike") -> np.ndarray:

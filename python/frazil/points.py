@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from os import PathLike
+from dataclasses import dataclass
+from os import PathLike, fspath
 
 import numpy as np
 
 from . import _frazil
-from ._frazil import Mesh, PointSet
+from ._frazil import Camera, Mesh, PointSet
 
 SpacingFunction = Callable[[np.ndarray], np.ndarray]
 
 
 def poisson_points(
     mesh: Mesh,
-    spacing: float | np.ndarray | SpacingFunction | None = None,
+    spacing: float | np.ndarray | SpacingFunction | TextureSpacing | None = None,
     seed: int = 0,
     *,
     count: int | None = None,
@@ -29,10 +30,12 @@ def poisson_points(
     Parameters
     ----------
     mesh : Mesh
-        Any triangle soup with some area.
-    spacing : float, (V,) array or callable
+        Any triangle soup with some area. Where it has `rest` positions the points are placed on that pose, with its
+        spacing, and moved to the mesh: so they are the same in every pose.
+    spacing : float, (V,) array, callable or TextureSpacing
         The distance that points keep, metres, > 0. An array gives one value per vertex, linear over each triangle. A
-        callable takes (N, 3) positions and returns (N,) values; where it bends inside a triangle it is sampled finer.
+        callable takes (N, 3) positions and returns (N,) values; where it, or a texture, bends inside a triangle it is
+        sampled finer. See `spacing_from_texture` and `spacing_from_camera`.
     seed : int
         The points depend on (mesh, spacing, seed) alone, whatever the number of threads.
     count : int, optional
@@ -73,8 +76,10 @@ def poisson_points(
         if count <= 0:
             raise ValueError(f"poisson_points: count must be > 0, got {count}. Ask for one point or more.")
         return _frazil.poisson_points_by_count(mesh, count, *options)
+    if isinstance(spacing, TextureSpacing):
+        return _points_from_function(mesh, spacing.on(mesh), options)
     if callable(spacing):
-        return _points_from_function(mesh, spacing, options)
+        return _points_from_function(mesh, lambda places, *_: spacing(places), options)
     if np.ndim(spacing) == 0:
         return _frazil.poisson_points_constant(mesh, spacing, *options)
     values = np.asarray(spacing)
@@ -83,46 +88,86 @@ def poisson_points(
     return _frazil.poisson_points_varying(mesh, np.ascontiguousarray(values, np.float32), *options)
 
 
-def spacing_from_texture(mesh: Mesh, uvs: np.ndarray, image: np.ndarray | str | PathLike, low: float, high: float):
-    """Spacing per vertex from a texture: `low` metres where it is black, `high` where it is white.
+@dataclass(frozen=True)
+class TextureSpacing:
+    """Spacing from an image: `low` metres where it is 0, `high` where it is 1. Made by `spacing_from_texture`."""
+
+    image: np.ndarray  # (H, W) float32
+    low: float
+    high: float
+
+    def at(self, uvs: np.ndarray) -> np.ndarray:
+        """Spacing (N,) at texture coordinates (N, 2): bilinear, repeating, v pointing up."""
+        height, width = self.image.shape
+        # Pixel centres at (i + 1/2) / size.
+        x, y = uvs[:, 0] * width - 0.5, (1 - uvs[:, 1]) * height - 0.5
+        x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+        fx, fy = x - x0, y - y0
+
+        def pixel(dx, dy):
+            return self.image[(y0 + dy) % height, (x0 + dx) % width]
+
+        below, above = pixel(0, 1) * (1 - fx) + pixel(1, 1) * fx, pixel(0, 0) * (1 - fx) + pixel(1, 0) * fx
+        return self.low + (self.high - self.low) * np.clip(above * (1 - fy) + below * fy, 0, 1)
+
+    def on(self, mesh: Mesh) -> Callable:
+        """Spacing on the mesh by its texture coordinates, as a function of (positions, triangles, weights)."""
+        if mesh.uvs is None:
+            raise ValueError("Mesh: uvs must be given for a texture of spacing, got none. Unwrap the mesh.")
+        corners = corner_uvs(mesh)
+        return lambda _, triangles, weights: self.at(np.einsum("nk,nkj->nj", weights, corners[triangles]))
+
+
+def corner_uvs(mesh: Mesh) -> np.ndarray:
+    """The texture coordinates (F, 3, 2) of every triangle's corners, whatever their interpolation."""
+    uvs, kind = mesh.uvs.astype(np.float64), mesh.uvs_interpolation
+    if kind == "corner":
+        return uvs.reshape(-1, 3, 2)
+    if kind == "vertex":
+        return uvs[mesh.triangles]
+    rows = np.arange(len(mesh.triangles)) if kind == "uniform" else np.zeros(len(mesh.triangles), int)
+    return np.repeat(uvs[rows][:, None], 3, axis=1)
+
+
+def spacing_from_texture(image: np.ndarray | str | PathLike, low: float, high: float) -> TextureSpacing:
+    """Spacing from a texture on the mesh's texture coordinates: `low` where it is black, `high` where it is white.
 
     Parameters
     ----------
-    mesh : Mesh
-    uvs : (V, 2) array
-        Texture coordinates per vertex, v pointing up; they repeat.
     image : (H, W) or (H, W, C) array in [0, 1], or a path that OpenImageIO reads
-        The first channel counts.
+        The first channel counts, as stored; it repeats.
     low, high : float
-        Metres, > 0.
+        Metres, > 0; either may be the larger.
 
     Returns
     -------
-    (V,) float32 array for `poisson_points`.
+    TextureSpacing for `poisson_points`. Detail finer than a triangle is found; finer than the spacing it is not.
+
+    Raises
+    ------
+    ValueError
+        For distances that are not > 0 and finite, or an image without pixels.
+    OSError
+        For a file that cannot be read.
     """
-    if isinstance(image, (str, PathLike)):
+    for name, value in (("low", low), ("high", high)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"spacing_from_texture: {name} must be > 0 and finite, got {value}. It is in metres.")
+    if isinstance(image, str | PathLike):
         import OpenImageIO as oiio
 
-        buffer = oiio.ImageBuf(str(image))
-        if buffer.has_error:
-            raise OSError(f"{image}: file must be an image, got: {buffer.geterror()}")
-        image = buffer.get_pixels(oiio.FLOAT)
-    image = np.asarray(image, np.float32)
-    image = image[..., 0] if image.ndim == 3 else image
-    uvs = np.asarray(uvs, np.float32)
-    if uvs.shape != (len(mesh.positions), 2):
-        raise ValueError(f"spacing_from_texture: uvs must have shape ({len(mesh.positions)}, 2), got {uvs.shape}.")
-    height, width = image.shape
-    # Bilinear, pixel centres at (i + 1/2) / size.
-    x, y = uvs[:, 0] * width - 0.5, (1 - uvs[:, 1]) * height - 0.5
-    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = x - x0, y - y0
-
-    def at(dx, dy):
-        return image[(y0 + dy) % height, (x0 + dx) % width]
-
-    value = (at(0, 0) * (1 - fx) + at(1, 0) * fx) * (1 - fy) + (at(0, 1) * (1 - fx) + at(1, 1) * fx) * fy
-    return (low + (high - low) * value).astype(np.float32)
+        path = fspath(image)
+        buffer = oiio.ImageBuf(path)
+        image = None if buffer.has_error else buffer.get_pixels(oiio.FLOAT)
+        if image is None or buffer.has_error:
+            raise OSError(f"{path}: file must be an image, got: {buffer.geterror().splitlines()[0]}. Check the path.")
+    pixels = np.asarray(image, np.float32)
+    pixels = pixels[..., 0] if pixels.ndim == 3 else pixels
+    if pixels.ndim != 2 or pixels.size == 0 or not np.isfinite(pixels).all():
+        raise ValueError(
+            f"spacing_from_texture: image must have shape (H, W) or (H, W, C) and be finite, got {pixels.shape}."
+        )
+    return TextureSpacing(np.ascontiguousarray(pixels), float(low), float(high))
 
 
 def spacing_from_camera(
@@ -154,8 +199,25 @@ def spacing_from_camera(
     return spacing
 
 
-def _evaluate(function: SpacingFunction, places: np.ndarray) -> np.ndarray:
-    values = np.asarray(function(places), np.float64)
+def pixel_angle(camera: Camera, resolution: tuple[int, int]) -> float:
+    """The angle of a pixel in the middle of a perspective camera's picture, radians.
+
+    Raises
+    ------
+    ValueError
+        For an orthographic camera, whose pixels are of one size everywhere: give a number as spacing.
+    """
+    if camera.is_orthographic:
+        raise ValueError(f"{camera.path}: camera must be a perspective one, got orthographic. Give a constant spacing.")
+    width, height = resolution
+    aperture = max(camera.horizontal_aperture, camera.vertical_aperture * width / height)
+    return aperture / camera.focal_length / width
+
+
+def _evaluate(function: Callable, places: np.ndarray, triangles: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Values (N, 3) of the function at the corners of N parts, from their places and weights in their old triangles."""
+    places, weights, triangles = places.reshape(-1, 3), weights.reshape(-1, 3), np.repeat(triangles, 3)
+    values = np.asarray(function(places, triangles, weights), np.float64)
     if values.shape != (len(places),):
         raise ValueError(
             f"poisson_points: spacing(positions) must return shape ({len(places)},), got {values.shape}. "
@@ -164,13 +226,15 @@ def _evaluate(function: SpacingFunction, places: np.ndarray) -> np.ndarray:
     if not np.all(np.isfinite(values) & (values > 0)):
         bad = values[~(np.isfinite(values) & (values > 0))][0]
         raise ValueError(f"poisson_points: spacing must be > 0 and finite, got {bad}. It is in metres.")
-    return values
+    return values.reshape(-1, 3)
 
 
-def _points_from_function(mesh: Mesh, function: SpacingFunction, options: tuple) -> PointSet:
+def _points_from_function(mesh: Mesh, function: Callable, options: tuple) -> PointSet:
     """Cut triangles in four until the function is near linear on each, place points, and name the old triangles."""
     triangles = mesh.triangles
-    corners = mesh.positions.astype(np.float64)[triangles]  # (F, 3, 3)
+    # The function is asked on the pose that the points are placed on.
+    places = mesh.positions if mesh.rest is None else mesh.rest
+    corners = places.astype(np.float64)[triangles]  # (F, 3, 3)
     weights = np.broadcast_to(np.eye(3), corners.shape)  # of the corners in their old triangle
     parents = np.arange(len(triangles))
     done = []
@@ -178,8 +242,9 @@ def _points_from_function(mesh: Mesh, function: SpacingFunction, options: tuple)
         if len(parents) == 0:
             break
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-        at_corners = _evaluate(function, corners.reshape(-1, 3)).reshape(-1, 3)
-        at_middles = _evaluate(function, middles.reshape(-1, 3)).reshape(-1, 3)
+        between = 0.5 * (weights + np.roll(weights, -1, axis=1))
+        at_corners = _evaluate(function, corners, parents, weights)
+        at_middles = _evaluate(function, middles, parents, between)
         bend = np.abs(at_middles - 0.5 * (at_corners + np.roll(at_corners, -1, axis=1))) / at_middles
         edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
         # Long triangles are sampled anyway, as a function may turn between its samples.
@@ -213,7 +278,4 @@ def _points_from_function(mesh: Mesh, function: SpacingFunction, options: tuple)
     own = np.stack([1 - u - v, u, v], axis=1)
     points.barycentrics[:] = np.einsum("nk,nkj->nj", own, weights[part])[:, 1:]
     points.triangles[:] = parents[part]
-    first, second, third = (mesh.positions.astype(np.float64)[triangles[:, k]] for k in range(3))
-    areas = 0.5 * np.linalg.norm(np.cross(second - first, third - first), axis=1)
-    points.triangle_areas[:] = areas[points.triangles]
-    return points
+    return points if mesh.rest is None else points.on(mesh)

@@ -20,7 +20,7 @@ import numpy as np
 
 from . import _frazil
 from .aovs import chosen_aovs
-from .baking import BAKE_OPTIONS, Bake, refresh_bake
+from .baking import BAKE_FREE_OPTIONS, BAKE_OPTIONS, Bake, refresh_bake
 from .checkpoint import Checkpoint
 from .cryptomatte import scene_headers
 from .denoise import check_denoiser, denoise_film
@@ -46,6 +46,7 @@ def render(
     max_bounces: int = 4,
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
+    spacing_pixels: float = 0.0,
     bake_samples: int = 64,
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
@@ -88,6 +89,8 @@ def render(
         Of the translucency points, metres; 0 = by material.
     spacing_scale : float
         Multiplies every spacing, > 0.
+    spacing_pixels : float
+        Points are no nearer to each other than so many pixels of the camera, so that far ice takes fewer; 0 = off.
     bake_samples : int
         Shadow rays per point and light, 1 or more; a quarter as many look for bounced light.
     bake_error : float
@@ -158,6 +161,7 @@ def render(
         "max_bounces": max_bounces,
         "spacing": spacing,
         "spacing_scale": spacing_scale,
+        "spacing_pixels": spacing_pixels,
         "bake_samples": bake_samples,
         "bake_error": bake_error,
         "translucent_shadows": translucent_shadows,
@@ -182,7 +186,9 @@ def render(
         job["resume"] = saved.load()
     bake_stats: dict[str, Any] = {}
     if bake_cache is not None:
-        bake, report = refresh_bake(scene, bake_cache, {k: options[k] for k in (*BAKE_OPTIONS, "threads")}, progress)
+        bake, report = refresh_bake(
+            scene, bake_cache, {k: options[k] for k in (*BAKE_OPTIONS, *BAKE_FREE_OPTIONS)}, progress
+        )
         bake_stats = {**report.stats, "bake_cache": str(report)}
     if bake is not None:
         job["bake"] = bake
@@ -257,6 +263,7 @@ def _what_layers_hold(result: Any) -> dict[str, Any]:
         "frazil:additive": [row["name"] for row in _frazil.aov_table() if row["is_additive"]],
         "frazil:compensation": json.dumps(list(result.compensations)),
         "frazil:ramp_knots": json.dumps(knots) if knots else None,
+        "frazil:overlays": json.dumps(list(result.overlays)) if result.overlays else None,
     }
 
 

@@ -45,7 +45,7 @@ inline Material ice(const Rgb& sigma_a, float eta, float roughness, Compensation
     model.medium = {Rgb(20.0f), sigma_a, eta};
     model.roughness.value = roughness;
     model.compensation.mode = mode;
-    model.spacing = 0.04f;
+    model.spacing.value = 0.04f;
     return {"/ice", model};
 }
 

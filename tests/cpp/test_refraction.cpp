@@ -222,3 +222,43 @@ TEST_CASE("the refraction multiplier of a light acts on what is seen through ice
     CHECK(mean_inside(none, "refraction", 0) < 1e-6);
     CHECK(mean_inside(none, "specular", 0) == doctest::Approx(mean_inside(full, "specular", 0)).epsilon(1e-6));
 }
+
+TEST_CASE("light through clear ice makes no sparks: no place behind it gets more than without the ice") {
+    // Broad lobes take light along straight lines, at grazing angles too.
+    Scene scene = scene_of(sphere(1.0f, 4), clear_ice(Rgb(1e-6f), 1.31f, 0.3f));
+    scene.meshes.push_back(floor_square(4.0f, -1.05f));
+    scene.mesh_paths.push_back("/floor");
+    StandardMaterial white;
+    white.diffuse_color.value = Rgb(0.8f);
+    white.use_specular_workflow = true;
+    white.roughness.value = 1.0f;
+    scene.materials.push_back({"/white", white});
+    scene.objects.push_back({"/floor", 1, 1, M44f()});
+    Light sun;
+    sun.path = "/sun";
+    sun.shape = DistantLight{0.5f};
+    sun.normalize = true;
+    sun.light_to_world.rotate(V3f(-0.6f, 0.0f, 0.0f));
+    scene.lights = {sun};
+    scene.camera.camera_to_world = M44f();
+    scene.camera.camera_to_world.rotate(V3f(-1.2f, 0.0f, 0.0f));
+    scene.camera.camera_to_world[3][1] = 7.0f, scene.camera.camera_to_world[3][2] = 2.0f;
+    RenderOptions options = small();
+    options.max_bounces = 0;  // direct light alone
+    const Film with = render(scene, options).film;
+    scene.objects.erase(scene.objects.begin());
+    const Film without = render(scene, options).film;
+    double most = 0.0, least = 1e9, bare = 0.0;
+    for (int y = 0; y < with.height; ++y) {
+        for (int x = 0; x < with.width; ++x) {
+            if (pixel(with, "object_id", x, y)[0] != 2.0f || pixel(with, "beauty", x, y)[3] < 1.0f) continue;
+            bare = std::max(bare, double(pixel(without, "diffuse", x, y)[0]));
+            most = std::max(most, double(pixel(with, "diffuse", x, y)[0]));
+            least = std::min(least, double(pixel(with, "diffuse", x, y)[0]));
+        }
+    }
+    CHECK(bare > 0.05);
+    CHECK(most <= bare * 1.001);
+    CHECK(least > 0.3 * bare);
+    CHECK(least < 0.97 * bare);
+}

@@ -158,7 +158,7 @@ TEST_CASE("a stop that is asked for ends the render") {
 
 TEST_CASE("default spacing gives a tiny body a thousand points, and a vast one is warned of") {
     Scene scene = scene_of(sphere(1e-3f, 3), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
-    std::get<IceMaterial>(scene.materials[0].model).spacing = 0.0f;
+    std::get<IceMaterial>(scene.materials[0].model).spacing.value = 0.0f;
     scene.lights = {dome(Rgb(1.0f))};
     RenderOptions options = small();
     options.bake_samples = 1;
@@ -171,4 +171,28 @@ TEST_CASE("default spacing gives a tiny body a thousand points, and a vast one i
     const RenderStats coarse = render(scene, options).stats;
     REQUIRE(coarse.warnings.size() == 1);
     CHECK(coarse.warnings[0].find("/shape: points are 0.0001 m apart") == 0);
+}
+
+TEST_CASE("places of a pixel that lie near to each other share a gather, without changing what is seen") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(3.0f, 1.0f, 0.2f), 1.31f, 0.3f, CompensationMode::ratio));
+    scene.lights = {rect_above(4.0f, "")};
+    RenderOptions options = small();
+    options.samples = 64;
+    const auto seen = [&](int side, int samples) {
+        options.width = options.height = side;
+        options.samples = samples;
+        return render(scene, options);
+    };
+    // Pixels of a few centimetres share little, those of millimetres nearly all of their 64 samples.
+    const RenderResult wide = seen(16, 64);
+    CHECK(wide.stats.gathers > wide.stats.camera_rays / 8);
+    scene.camera.focal_length *= 40.0f;
+    const RenderResult near = seen(8, 64);
+    CHECK(near.stats.gathers < near.stats.camera_rays / 16);
+    const RenderResult apart = seen(64, 1);
+    CHECK(apart.stats.gathers > apart.stats.camera_rays / 2);
+    for (int c = 0; c < 3; ++c) {
+        CHECK(mean_inside(near.film, "translucency", c) ==
+              doctest::Approx(mean_inside(apart.film, "translucency", c)).epsilon(2e-3));
+    }
 }

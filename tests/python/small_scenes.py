@@ -13,14 +13,14 @@ def placed(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:
     return matrix
 
 
-def ice_over_floor(key: float = 40.0, sky: float = 0.4, radius: float = 1.0, camera_x: float = 0.0) -> fz.Scene:
-    """The scene; `key` and `sky` are the lights' radiance, `camera_x` moves the camera alone."""
+def ice_over_floor(key: float = 40.0, sky: float = 0.4, radius: float = 1.0, camera_x: float = 0.0, **look) -> fz.Scene:
+    """The scene; `key` and `sky` are radiances, `camera_x` moves the camera alone, `look` is of IceMaterial."""
     scene = fz.Scene()
     ball = trimesh.creation.icosphere(3, radius)
     ice = fz.Mesh(np.asarray(ball.vertices, np.float32), np.asarray(ball.faces, np.int32))
     corners = np.array([[-4, -1, -4], [4, -1, -4], [4, -1, 4], [-4, -1, 4]], np.float32)
     floor = fz.Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]], np.int32))
-    model = fz.IceMaterial(fz.Medium(sigma_s_prime=(8.0, 9.0, 10.0), sigma_a=(0.6, 0.2, 0.05)))
+    model = fz.IceMaterial(fz.Medium(sigma_s_prime=(8.0, 9.0, 10.0), sigma_a=(0.6, 0.2, 0.05)), **look)
     materials = [scene.add_material("/ice", model), scene.add_material("/grey", fz.StandardMaterial())]
     for path, mesh, material in (("/Ball", ice, materials[0]), ("/Floor", floor, materials[1])):
         scene.add_object(path, scene.add_mesh(mesh, path), material, placed())

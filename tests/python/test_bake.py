@@ -55,6 +55,16 @@ def test_only_the_light_group_that_changed_is_baked_again(tmp_path):
     np.testing.assert_array_equal(changed, fresh)
 
 
+def test_ramp_and_compensation_leave_the_bake_as_it_is(tmp_path):
+    path = tmp_path / "ice.bake"
+    before, _ = refreshed(ice_over_floor(), path)
+    scene = ice_over_floor(ramp_distances=[0.0, 0.5], ramp_colors=[(1, 1, 1), (0, 0.2, 1)], compensation="off")
+    after, report = refreshed(scene, path)
+    assert str(report) == "points and light taken over"
+    np.testing.assert_array_equal(after, before)
+    np.testing.assert_array_equal(light(fz.bake(scene, **OPTIONS)), before)
+
+
 @pytest.mark.parametrize("change", ["shape", "spacing", "samples"])
 def test_what_the_light_depends_on_makes_it_anew(tmp_path, change):
     path = tmp_path / "ice.bake"

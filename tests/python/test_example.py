@@ -160,7 +160,7 @@ def test_unwritable_output_fails_with_its_path(tmp_path):
 
 
 def test_a_box_meets_its_corners(example_modules):
-    from dual_contouring import contour
+    from frazil.formations.contour import contour
 
     half = np.array([0.31, 0.22, 0.17])
     turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
@@ -173,14 +173,14 @@ def test_a_box_meets_its_corners(example_modules):
 
 
 def test_surface_that_leaves_the_box_is_refused(example_modules):
-    from dual_contouring import contour
+    from frazil.formations.contour import contour
 
     with pytest.raises(ValueError, match="must lie inside the box"):
         contour(lambda p: np.linalg.norm(p, axis=1) - 2.0, [-1] * 3, [1] * 3, 0.1)
 
 
 def test_the_sky_is_brightest_towards_the_sun(example_modules):
-    from sky import make_sky
+    from frazil.formations.sky import make_sky
 
     pixels = make_sky(256, np.array([-0.8, 0.34, -0.62]), 3)
     row, column = np.unravel_index(pixels.sum(2).argmax(), pixels.shape[:2])

@@ -81,3 +81,18 @@ def test_turned_box_and_thin_shapes():
     check_guarantees(*mesh_of(trimesh.creation.box().apply_transform(turn)), 0.1)
     check_guarantees(*mesh_of(trimesh.creation.cylinder(0.02, 3)), 0.1)
     check_guarantees(*mesh_of(trimesh.creation.cone(0.1, 3)), 0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("thin_walls", [True, False])
+def test_two_million_places_on_a_dirty_mesh(thin_walls):
+    # A thin shell, doubled faces, a sliver fan and a body that cuts through: 40,000 points.
+    ball, faces = sphere()
+    box, box_faces = mesh_of(trimesh.creation.box((3, 0.3, 0.004)))
+    fan = np.float32([[2, 0, 0], [3, 1, 0], [3, 1 + 1e-5, 0], [3, 1 + 2e-5, 0]])
+    parts = [(ball, faces), (ball * np.float32(0.995), faces[:, ::-1]), (ball, faces[::7]), (box, box_faces)]
+    parts.append((fan, np.int32([[0, 1, 2], [0, 2, 3]])))
+    first = np.cumsum([0] + [len(p) for p, _ in parts])
+    positions = np.concatenate([p for p, _ in parts])
+    triangles = np.concatenate([t + f for (_, t), f in zip(parts, first, strict=False)]).astype(np.int32)
+    check_guarantees(positions, triangles, 0.023, thin_walls, samples=2_000_000)

@@ -1,9 +1,10 @@
-"""Spacing that varies, spacing by count, and points that ride on a moving mesh."""
+"""Spacing that varies, spacing by count, and the statistics of points."""
 
 import numpy as np
 import pytest
 import trimesh
-from point_checks import SAME_SIDE, mesh_of, nearest_pair, nearest_points, sample_surface
+from point_checks import mesh_of, nearest_pair, nearest_points, sample_surface
+from scipy.spatial import cKDTree
 
 import frazil as fz
 from frazil.points import spacing_from_camera, spacing_from_texture
@@ -76,21 +77,79 @@ def test_camera_spacing_grows_with_distance():
     check_varying(mesh, points, function, relative=0.06)
 
 
-def test_texture_spacing():
-    positions, triangles = square(8)
+@pytest.mark.parametrize("kind", ["vertex", "corner"])
+def test_texture_spacing(kind):
+    # Far finer than the two triangles that it lies on: stripes of fine and coarse points.
+    positions, triangles = square()
     mesh = fz.Mesh(positions, triangles)
-    image = np.tile(np.linspace(0, 1, 64, dtype=np.float32), (8, 1))
-    values = spacing_from_texture(mesh, np.clip(positions[:, :2], 0.01, 0.99), image, 0.02, 0.1)
-    assert values[0] == pytest.approx(0.02, abs=0.002)
-    assert len(fz.poisson_points(mesh, values)) > 100
-    with pytest.raises(ValueError, match="uvs must have shape"):
-        spacing_from_texture(mesh, positions, image, 0.02, 0.1)
+    uvs = positions[:, :2]
+    mesh.set_uvs(uvs if kind == "vertex" else uvs[triangles].reshape(-1, 2), kind)
+    ramp = 0.5 - 0.5 * np.cos(np.arange(64) / 64 * 2 * np.pi * 2)
+    image = np.tile(ramp.astype(np.float32), (8, 1))
+    texture = spacing_from_texture(image, 0.012, 0.05)
+    points = fz.poisson_points(mesh, texture)
+
+    def spacing_at(places):
+        return texture.at(places[:, :2])
+
+    check_varying(mesh, points, spacing_at, relative=0.07)
+    fine = spacing_at(points.positions) < 0.02
+    places = np.random.default_rng(0).random((10_000, 2))
+    assert fine.mean() > 2 * (texture.at(places) < 0.02).mean()
+
+
+def test_texture_is_read_right_way_up(tmp_path):
+    import OpenImageIO as oiio
+
+    pixels = np.zeros((4, 4, 3), np.float32)
+    pixels[0, 3] = 1  # the upper right corner, at (u, v) = (1, 1)
+    path = tmp_path / "spacing.tif"
+    buffer = oiio.ImageBuf(pixels)
+    assert buffer.write(str(path), "float")
+    texture = spacing_from_texture(path, 1, 3)
+    assert texture.at(np.array([[7 / 8, 7 / 8]])) == pytest.approx(3)
+    assert texture.at(np.array([[1 / 8, 7 / 8], [7 / 8, 1 / 8], [7 / 8 + 5, 1 / 8]])) == pytest.approx(1)
+
+
+def test_bad_textures(tmp_path):
+    for low, high in ((0, 1), (1, np.nan), (-1, 1)):
+        with pytest.raises(ValueError, match="must be > 0 and finite, got"):
+            spacing_from_texture(np.ones((2, 2)), low, high)
+    for image in (np.ones(3), np.zeros((0, 4)), np.full((2, 2), np.nan)):
+        with pytest.raises(ValueError, match="image must have shape"):
+            spacing_from_texture(image, 1, 2)
+    with pytest.raises(OSError, match="file must be an image"):
+        spacing_from_texture(tmp_path / "none.png", 1, 2)
+    with pytest.raises(ValueError, match="uvs must be given"):
+        fz.poisson_points(fz.Mesh(*square()), spacing_from_texture(np.ones((2, 2)), 0.1, 0.2))
 
 
 @pytest.mark.parametrize("count", [40, 1000, 20_000])
 def test_count(count):
     mesh = fz.Mesh(*mesh_of(trimesh.creation.icosphere(3)))
     assert abs(len(fz.poisson_points(mesh, count=count)) - count) <= 0.005 * count
+
+
+@pytest.mark.parametrize("shape", ["thin sheet", "soup", "shells", "needles", "far from the origin"])
+def test_count_on_dirty_meshes(shape):
+    random = np.random.default_rng(5)
+    ball, faces = mesh_of(trimesh.creation.icosphere(3))
+    if shape == "thin sheet":
+        mesh = mesh_of(trimesh.creation.box((1, 1, 0.002)))
+    elif shape == "soup":
+        corners = random.random((300, 1, 3)) + 0.1 * random.normal(size=(300, 3, 3))
+        mesh = corners.reshape(-1, 3).astype(np.float32), np.arange(900, dtype=np.int32).reshape(-1, 3)
+    elif shape == "shells":
+        both = np.concatenate([ball, ball * np.float32(0.99), ball])
+        mesh = both, np.concatenate([faces, faces + len(ball), faces[:, ::-1] + 2 * len(ball)])
+    elif shape == "needles":
+        corners = random.random((200, 1, 3)) + np.array([0.3, 1e-4, 1e-4]) * random.normal(size=(200, 3, 3))
+        mesh = corners.reshape(-1, 3).astype(np.float32), np.arange(600, dtype=np.int32).reshape(-1, 3)
+    else:
+        mesh = ball + np.float32(1e4), faces
+    for count in (500, 10_000):
+        points = fz.poisson_points(fz.Mesh(*mesh), count=count, seed=3)
+        assert abs(len(points) - count) <= 0.005 * count
 
 
 def test_count_that_no_spacing_gives():
@@ -123,27 +182,6 @@ def test_bad_count(count):
         fz.poisson_points(fz.Mesh(*square(1)), count=count)
 
 
-def test_points_ride_on_a_pose():
-    positions, triangles = mesh_of(trimesh.creation.icosphere(3))
-    rest = fz.Mesh(positions, triangles)
-    points = fz.poisson_points(rest, 0.1)
-    np.testing.assert_allclose(points.on(rest).positions, points.positions, atol=2e-7)
-    np.testing.assert_allclose(points.on(rest).areas, points.areas, rtol=1e-5)
-
-    stretch = np.float32([2, 1, 1])
-    pose = fz.Mesh(positions * stretch, triangles)
-    moved = points.on(pose)
-    np.testing.assert_allclose(moved.positions, points.positions * stretch, atol=1e-6)
-    assert moved.areas.sum(dtype="f8") == pytest.approx(pose.area, rel=1e-6)
-    assert (moved.triangles == points.triangles).all()
-    corners = pose.positions[pose.triangles[moved.triangles]].astype("f8")
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    np.testing.assert_allclose(moved.normals, normals, atol=1e-5)
-    with pytest.raises(ValueError, match="must be those of the mesh"):
-        points.on(fz.Mesh(*mesh_of(trimesh.creation.icosphere(1))))
-
-
 def test_statistics_agree_with_a_tree():
     positions, triangles = mesh_of(trimesh.creation.icosphere(4))
     mesh = fz.Mesh(positions, triangles)
@@ -156,7 +194,25 @@ def test_statistics_agree_with_a_tree():
     assert 0.9 * points.spacing < measured.gap <= points.spacing * (1 + 1e-6)
     assert measured.area_sum == pytest.approx(mesh.area, rel=1e-5)
     assert measured.area_spread == pytest.approx(points.areas.std() / points.areas.mean(), rel=1e-4)
-    assert SAME_SIDE > 0
+    assert measured.mean_area == pytest.approx(points.areas.mean(), rel=1e-4)
+    distances, _ = cKDTree(points.positions.astype(np.float64)).query(points.positions.astype(np.float64), k=2)
+    assert measured.min_distance == pytest.approx(distances[:, 1].min(), rel=1e-9)
+    assert measured.mean_distance == pytest.approx(distances[:, 1].mean(), rel=1e-9)
+    assert measured.distance_spread == pytest.approx(distances[:, 1].std() / distances[:, 1].mean(), rel=1e-6)
+    places, _, normals, _, _, _ = sample_surface(positions, triangles, 400_000)
+    gap, _ = nearest_points(points, places, normals, True, 0.2)
+    assert measured.gap == pytest.approx(gap.max(), rel=0.02)
+
+
+def test_statistics_tell_the_walls_of_a_sheet_apart():
+    mesh = fz.Mesh(*mesh_of(trimesh.creation.box((1.0, 1.0, 0.005))))
+    points = fz.poisson_points(mesh, 0.05)
+    assert fz.point_statistics(points, mesh).min_distance >= 0.05
+    through = fz.point_statistics(points, mesh, thin_walls=False)
+    nearest = cKDTree(points.positions).query(points.positions, k=2)[0][:, 1]
+    assert through.min_distance == pytest.approx(nearest.min(), rel=1e-5)
+    with pytest.raises(ValueError, match="points must be 1 or more"):
+        fz.point_statistics(fz.PointSet(), mesh)
 
 
 def test_poisson_is_more_even_than_tessellated():

@@ -31,6 +31,7 @@ def _frazil(
 def app() -> Callable[..., Any]:
     """The command line as a callable that takes ``args``, ``prog_name`` and ``standalone_mode``."""
     from .bake import bake_command
+    from .formation import formation_commands
     from .grade import grade_command
     from .info import info_command
     from .match import match_command
@@ -46,5 +47,6 @@ def app() -> Callable[..., Any]:
     commands.command("grade")(grade_command)
     commands.command("match")(match_command)
     commands.command("bake")(bake_command)
+    commands.add_typer(formation_commands(), name="formation")
     commands.command("info")(info_command)
     return typer.main.get_command(commands).main

@@ -19,6 +19,10 @@ def bake_command(
     frame: Annotated[
         float | None, typer.Option(metavar="F", help="Time code to bake. Default: the stage's default values.")
     ] = None,
+    rest_frame: Annotated[
+        float | None,
+        typer.Option(metavar="F", help="Time code at which deforming meshes rest, so that points stay on them."),
+    ] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="0 = all cores; the bake is the same.")] = 0,
     seed: Annotated[int, typer.Option(metavar="N", help="Of all random numbers.")] = 0,
     spacing: Annotated[
@@ -77,7 +81,7 @@ def bake_command(
         "estimator": estimator,
     }
     with make_progress("none" if quiet and progress == "bar" else progress, 1) as reporter:
-        loaded = load_usd(scene, frame=frame)
+        loaded = load_usd(scene, frame=frame, rest_frame=rest_frame)
         reporter("load", 1.0)
         bake, report = refresh_bake(loaded, output, options, reporter)
     if not quiet:

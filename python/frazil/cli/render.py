@@ -64,6 +64,10 @@ def render_command(
     frames: Annotated[
         str | None, typer.Option(metavar="A-B[xSTEP]", help="Several frames, as in 1-100x2 or 1,5,20-30.")
     ] = None,
+    rest_frame: Annotated[
+        float | None,
+        typer.Option(metavar="F", help="Time code at which deforming meshes rest, so that points stay on them."),
+    ] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="0 = all cores; the picture is the same.")] = 0,
     seed: Annotated[int, typer.Option(metavar="N", help="Of all random numbers.")] = 0,
     max_bounces: Annotated[int, typer.Option(metavar="N", help="Of diffuse and specular paths.")] = 4,
@@ -71,6 +75,9 @@ def render_command(
         float, typer.Option(metavar="METRES", help="Between translucency points. 0 = by material.")
     ] = 0.0,
     spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
+    spacing_pixels: Annotated[
+        float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels, so that far ice takes fewer.")
+    ] = 0.0,
     bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
     bake_error: Annotated[
         float,
@@ -132,6 +139,7 @@ def render_command(
     positive("--bake-error", bake_error, may_be_zero=True)
     positive("--spacing-scale", spacing_scale)
     positive("--spacing", spacing, may_be_zero=True)
+    positive("--spacing-pixels", spacing_pixels, may_be_zero=True)
     within("--samples", samples, 1, 2**24)
     within("--min-samples", min_samples, 1, 2**24)
     positive("--noise", noise, may_be_zero=True)
@@ -157,7 +165,7 @@ def render_command(
 
     from ..aovs import layers_of
     from ..rendering import render as render_scene
-    from ..usd import load_usd
+    from ..usd import add_motion, load_usd
 
     options: dict[str, Any] = {
         "samples": samples,
@@ -170,6 +178,7 @@ def render_command(
         "max_bounces": max_bounces,
         "spacing": spacing,
         "spacing_scale": spacing_scale,
+        "spacing_pixels": spacing_pixels,
         "bake_samples": bake_samples,
         "bake_error": bake_error,
         "translucent_shadows": translucent_shadows,
@@ -181,12 +190,14 @@ def render_command(
     with make_progress("none" if quiet and progress == "bar" else progress, len(jobs)) as reporter:
         for time_code, exr, preview in jobs:
             start = time.perf_counter()
-            loaded = load_usd(scene, frame=time_code, camera=camera)
+            loaded = load_usd(scene, frame=time_code, camera=camera, rest_frame=rest_frame)
             seconds_load = time.perf_counter() - start
             reporter("load", 1.0)
 
             chosen = layers or _authored_layers(loaded)
             options["aovs"] = chosen or ()
+            if chosen and "motion" in chosen:
+                add_motion(loaded)
             options["lpes"] = expressions | _authored_lpes(loaded)
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)

@@ -1,5 +1,5 @@
 """USD stages as scenes: ``load_usd`` for rendering, ``read_meshes`` for the points tool."""
 
-from .stage import UsdScene, load_usd, read_meshes
+from .stage import UsdScene, add_motion, load_usd, read_meshes
 
-__all__ = ["UsdScene", "load_usd", "read_meshes"]
+__all__ = ["UsdScene", "add_motion", "load_usd", "read_meshes"]

@@ -24,6 +24,7 @@ class ReadContext:
     time: Usd.TimeCode
     purposes: frozenset[str]
     subdivision_level: int
+    rest_time: Usd.TimeCode | None = None  # of meshes whose points move and that have no rest primvar
     warnings: list[str] = field(default_factory=list)
     temporary_files: dict[str, Path] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set)

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom
 
 from .._frazil import ControlMesh, Mesh, subdivide, triangulate
 from .context import ReadContext
-from .primvars import Primvar, read_display_color, read_normals, read_texcoords
+from .primvars import Primvar, read_display_color, read_normals, read_rest, read_spacing, read_texcoords
 
 # Above this many triangles a cage is refined less, so that dense scans stay what they are.
 _MAX_REFINED_TRIANGLES = 4_000_000
@@ -50,24 +50,54 @@ def read_mesh(context: ReadContext, prim: Usd.Prim, texcoord_name: str | None) -
         normals, uvs, colors = (_reorder_corners(primvar, order) for primvar in (normals, uvs, colors))
 
     level = _subdivision_steps(context, schema, counts, normals is not None)
-    cage = ControlMesh(
-        points,
-        counts,
-        indices,
-        hole_indices=_array(context, schema.GetHoleIndicesAttr(), np.int32),
-        normals=normals if level is None else None,
-        uvs=uvs,
-        colors=colors,
-        **({} if level is None else _creases(context, schema)),
-    )
-    if level is None:
-        mesh, faces = triangulate(cage, str(path))
-    else:
-        mesh, faces = subdivide(cage, 2**level, str(path))
+
+    def cage_of(positions: np.ndarray, **primvars) -> ControlMesh:
+        creases = {} if level is None else _creases(context, schema)
+        holes = _array(context, schema.GetHoleIndicesAttr(), np.int32)
+        return ControlMesh(positions, counts, indices, hole_indices=holes, **primvars, **creases)
+
+    cage = cage_of(points, normals=normals if level is None else None, uvs=uvs, colors=colors)
+    mesh, faces = _refined(cage, level, str(path))
     if len(faces) == 0:
         context.warn(path, "has no faces that can be seen. It is left out.")
         return []
+    _set_point_data(context, schema, mesh, len(points), lambda values: _refined_like(values, cage_of, level, mesh))
     return _split_by_subsets(context, schema, mesh, faces, len(counts))
+
+
+def _refined(cage: ControlMesh, level: int | None, path: str) -> tuple[Mesh, np.ndarray]:
+    return triangulate(cage, path) if level is None else subdivide(cage, 2**level, path)
+
+
+def _refined_like(values: np.ndarray, cage_of, level: int | None, mesh: Mesh) -> np.ndarray | None:
+    """The vertices (V, 3) of another pose of a cage, refined as `mesh` was; None where that gave other vertices."""
+    positions = values if level is None else _refined(cage_of(values), level, "rest")[0].positions
+    return positions if len(positions) == len(mesh.positions) else None
+
+
+def _set_point_data(context: ReadContext, schema: UsdGeom.Mesh, mesh: Mesh, count: int, refine) -> None:
+    """Give the mesh what points ask for: its rest pose, and their spacing where that is a primvar.
+
+    `refine` takes (V, 3) values of the cage to the mesh's vertices.
+    """
+    rest = read_rest(context, schema, count)
+    if rest is not None:
+        refined = refine(rest)
+        if refined is None:
+            context.warn(schema.GetPath(), "its rest pose is not subdivided like the mesh. It has none.")
+        else:
+            mesh.set_rest(refined)
+    spacing = read_spacing(context, schema.GetPrim(), count)
+    if spacing is not None:
+        if len(spacing) == count and count > 1:
+            refined = refine(np.repeat(spacing[:, None], 3, axis=1))
+            if refined is None:
+                return
+            # A limit surface may leave the range of its cage.
+            values = np.clip(refined[:, 0], spacing.min(), spacing.max())
+        else:
+            values = np.full(len(mesh.positions), spacing[0], np.float32)
+        mesh.set_spacing(np.ascontiguousarray(values))
 
 
 def material_subsets(prim: Usd.Prim) -> list[UsdGeom.Subset]:

@@ -123,7 +123,14 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
     ),
     MaterialInput("compensation_limit", "float", 8.0, 1.0, meaning="largest gain"),
     MaterialInput("compensation_strength", "float", 1.0, 0.0, 1.0, meaning="0 = off, 1 = full"),
-    MaterialInput("spacing", "float", 0.0, length_power=1, meaning="of the points; 0 = from the mean free path"),
+    MaterialInput(
+        "spacing",
+        "float",
+        0.0,
+        length_power=1,
+        takes_texture=True,
+        meaning="of the points; 0 = from the mean free path; a texture is read at the mesh's vertices",
+    ),
 )
 
 # frazil:overlay, a shader whose output is connected to an input `overlays:NAME` of frazil:ice.

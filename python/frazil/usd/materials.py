@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Tf, Usd, UsdShade
 
-from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial
+from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial, TextureLookup
 from ..ice import find_preset, preset_medium, preset_overlays
 from .context import ReadContext
 from .material_inputs import (
@@ -187,7 +187,8 @@ class MaterialReader:
                     f"{values['age_begin']:g} is used.",
                 )
                 values["age_end"] = values["age_begin"]
-            overlays.append(Overlay(**values))
+            name = overlay_input.GetBaseName().removeprefix(_OVERLAY_PREFIX)
+            overlays.append(Overlay(**values, name=name))
             masks[str(shader.GetPath())] = sources["mask"]
         return overlays, masks
 
@@ -274,7 +275,7 @@ class MaterialReader:
             return row.default
         if source.lookup is not None:
             if row.takes_texture:
-                return source.lookup
+                return _scaled(source.lookup, self._context.meters_per_unit**row.length_power)
             self._context.warn(shader.GetPath(), f"{row.name} takes no texture. {row.default} is used.")
             return row.default
         try:
@@ -326,6 +327,21 @@ class MaterialReader:
 def _text(array: np.ndarray) -> str:
     values = ", ".join(f"{value:g}" for value in array.reshape(-1))
     return values if array.size == 1 else f"({values})"
+
+
+def _scaled(lookup: TextureLookup, unit: float) -> TextureLookup:
+    """A lookup whose values are multiplied by a unit."""
+    if unit == 1.0:
+        return lookup
+    return TextureLookup(
+        lookup.texture,
+        lookup.first_channel,
+        [unit * x for x in lookup.scale],
+        [unit * x for x in lookup.bias],
+        lookup.st_scale,
+        lookup.st_rotation,
+        lookup.st_translation,
+    )
 
 
 def _texcoord_name(context: ReadContext, path, sources: dict[str, Source | None]) -> str | None:

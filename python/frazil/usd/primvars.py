@@ -127,3 +127,45 @@ def read_normals(context: ReadContext, mesh: UsdGeom.PointBased, sizes: dict[str
         context.warn(mesh.GetPath(), "normals must have a length, got (0, 0, 0). They are left out.")
         return None
     return normals[0] / lengths, normals[1]
+
+
+# Positions in a pose that does not move, as USD's houses call them.
+_REST_NAMES = ("rest", "Pref", "pref", "__Pref")
+
+
+def read_rest(context: ReadContext, mesh: UsdGeom.PointBased, count: int) -> np.ndarray | None:
+    """Rest positions (V, 3) float32: a primvar of that name, else the points at the rest frame where they move."""
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    sizes = {"constant": 1, "uniform": -1, "vertex": count, "corner": -1}
+    for name in _REST_NAMES:
+        primvar = primvars.GetPrimvar(name)
+        if not primvar or not primvar.HasAuthoredValue():
+            continue
+        found = read_primvar(context, primvar, 3, sizes)
+        return None if found is None else found[0]
+    points = mesh.GetPointsAttr()
+    if context.rest_time is None or not points.ValueMightBeTimeVarying():
+        return None
+    rest = np.asarray(points.Get(context.rest_time), np.float32).reshape(-1, 3)
+    if len(rest) != count:
+        context.warn(
+            mesh.GetPath(), f"must have {count} points at the rest frame, got {len(rest)}. It has no rest pose."
+        )
+        return None
+    return rest
+
+
+def read_spacing(context: ReadContext, prim: Usd.Prim, count: int) -> np.ndarray | None:
+    """primvars:frazil:spacing in metres: (V,) float32, or (1,) where it is the same all over."""
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("frazil:spacing")
+    if not primvar or not primvar.HasAuthoredValue():
+        return None
+    found = read_primvar(context, primvar, 1, {"constant": 1, "uniform": -1, "vertex": count, "corner": -1})
+    if found is None:
+        return None
+    spacing = found[0][:, 0] * np.float32(context.meters_per_unit)
+    if not (spacing > 0).all():
+        wrong = spacing[~(spacing > 0)][0]
+        context.warn(prim.GetPath(), f"frazil:spacing must be > 0, got {wrong:g} m. It is left out.")
+        return None
+    return spacing

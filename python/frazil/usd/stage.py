@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 
 from pxr import Tf, Usd, UsdUtils
 
 from .._frazil import Mesh, Scene
+from ..warning import FrazilWarning
 from .camera import choose_camera
 from .context import ReadContext
 from .instancing import StageWalker
@@ -46,6 +48,7 @@ def load_usd(
     *,
     purposes: Iterable[str] = ("default", "render"),
     subdivision_level: int = 2,
+    rest_frame: float | None = None,
 ) -> UsdScene:
     """Read a USD stage (.usd, .usda, .usdc, .usdz) as a scene.
 
@@ -62,6 +65,9 @@ def load_usd(
         Which purposes are rendered, of 'default', 'render', 'proxy' and 'guide'.
     subdivision_level : int
         How often each edge of a Catmull-Clark mesh is halved, >= 0; dense meshes are halved less often.
+    rest_frame : float, optional
+        Time code at which meshes that deform are in their rest pose, so that points stay on them in all frames; a
+        primvar `rest` or `Pref` of a mesh goes before it.
 
     Returns
     -------
@@ -80,7 +86,7 @@ def load_usd(
     >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
     >>> film = fz.render(scene)  # doctest: +SKIP
     """
-    context, diagnostics = _open(path, frame, purposes, subdivision_level)
+    context, diagnostics = _open(path, frame, purposes, subdivision_level, rest_frame)
     scene = UsdScene()
     StageWalker(context, scene).walk()
     if not scene.objects:
@@ -93,16 +99,54 @@ def load_usd(
     scene.file = context.file
     scene.frame = None if context.time.IsDefault() or context.time.IsEarliestTime() else context.time.GetValue()
     scene.render_settings = settings
+    scene.reading = (frozenset(purposes), subdivision_level, rest_frame)
     scene.warnings = context.warnings
     return scene
 
 
-def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tuple[str, Mesh]]:
+def add_motion(scene: UsdScene, frames: float = 1.0) -> None:
+    """Tell a scene how it goes on, so that the layer ``motion`` can be rendered.
+
+    Parameters
+    ----------
+    scene : UsdScene
+        From load_usd.
+    frames : float
+        How far ahead the place is that motion vectors point to.
+
+    Raises
+    ------
+    OSError
+        The stage is no longer there.
+
+    Examples
+    --------
+    >>> scene = fz.load_usd("spires.usda", frame=12)  # doctest: +SKIP
+    >>> fz.add_motion(scene)  # doctest: +SKIP
+    >>> motion = fz.render(scene, aovs=["motion"])["motion"]  # doctest: +SKIP
+    """
+    if scene.frame is None:  # no time: all stands still
+        scene.set_motion(scene)
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrazilWarning)  # said when the scene was read
+        context, diagnostics = _open(scene.file, scene.frame + frames, *scene.reading)
+        later = Scene()
+        StageWalker(context, later).walk()
+        prim = context.stage.GetPrimAtPath(scene.camera.path) if scene.camera.path.startswith("/") else None
+        later.camera = choose_camera(context, later, scene.camera.path, None) if prim else scene.camera
+        diagnostics.TakeUncoalescedDiagnostics()
+    scene.set_motion(later)
+
+
+def read_meshes(
+    path: str | os.PathLike, frame: float | None = None, rest_frame: float | None = None
+) -> list[tuple[str, Mesh]]:
     """The meshes of a USD stage, instances and all, in world space.
 
     Parameters
     ----------
-    path, frame
+    path, frame, rest_frame
         As in load_usd.
 
     Returns
@@ -115,18 +159,20 @@ def read_meshes(path: str | os.PathLike, frame: float | None = None) -> list[tup
     OSError
         The file is missing, empty, broken or no USD.
     """
-    context, diagnostics = _open(path, frame, ("default", "render"), 2)
+    context, diagnostics = _open(path, frame, ("default", "render"), 2, rest_frame)
     scene = Scene()
     StageWalker(context, scene).walk()
     _pass_on(context, diagnostics)
     return [(item.path, scene.mesh(item.mesh).transformed(item.matrix)) for item in scene.objects]
 
 
-def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int):
+def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level: int, rest_frame: float | None = None):
     """The stage at its time, and the delegate that keeps USD's own messages off the terminal."""
     name = os.fspath(path)
     if frame is not None and not math.isfinite(frame):
         raise ValueError(f"{name}: frame must be a finite number, got {frame}.")
+    if rest_frame is not None and not math.isfinite(rest_frame):
+        raise ValueError(f"{name}: rest_frame must be a finite number, got {rest_frame}.")
     if not 0 <= subdivision_level <= 8:
         raise ValueError(f"{name}: subdivision_level must be in 0..8, got {subdivision_level}.")
     wanted = frozenset(purposes)
@@ -152,7 +198,8 @@ def _open(path, frame: float | None, purposes: Iterable[str], subdivision_level:
         time = Usd.TimeCode(stage.GetStartTimeCode())
     else:
         time = Usd.TimeCode.EarliestTime()
-    return ReadContext(stage, name, time, wanted, subdivision_level), diagnostics
+    rest_time = None if rest_frame is None else Usd.TimeCode(rest_frame)
+    return ReadContext(stage, name, time, wanted, subdivision_level, rest_time), diagnostics
 
 
 def _first_line(error: Tf.ErrorException) -> str:

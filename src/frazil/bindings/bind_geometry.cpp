@@ -149,8 +149,13 @@ void bind_geometry(nb::module_& module) {
             "__init__",
             [](Mesh* self, const FloatArray& positions, const IntArray& triangles,
                const std::optional<FloatArray>& normals, const std::optional<FloatArray>& uvs) {
-                new (self) Mesh{
-                    to_vectors3(positions, "Mesh: positions"), to_indices3(triangles, "Mesh: triangles"), {}, {}, {}};
+                new (self) Mesh{to_vectors3(positions, "Mesh: positions"),
+                                to_indices3(triangles, "Mesh: triangles"),
+                                {},
+                                {},
+                                {},
+                                {},
+                                {}};
                 check_mesh(*self, "Mesh");
                 if (normals) set_primvar(self->normals, to_vectors3(*normals, "Mesh: normals"), {}, *self, "normals");
                 if (uvs) set_primvar(self->uvs, to_vectors2(*uvs, "Mesh: uvs"), {}, *self, "uvs");
@@ -184,6 +189,39 @@ void bind_geometry(nb::module_& module) {
                 set_primvar(mesh.colors, to_vectors3(values, "Mesh: colors"), interpolation, mesh, "colors");
             },
             "values"_a, "interpolation"_a = nb::none(), "Give display colours, linear RGB; see set_normals.")
+        .def(
+            "set_rest",
+            [](Mesh& mesh, const FloatArray& values) {
+                mesh.rest = to_vectors3(values, "Mesh: rest");
+                check_mesh(mesh, "Mesh");
+            },
+            "values"_a,
+            "Give positions (V, 3) float32, metres, in a pose that does not move: points are placed there and stay on\n"
+            "their triangles in every other pose.")
+        .def(
+            "set_spacing",
+            [](Mesh& mesh, const FloatArray& values) {
+                mesh.spacing.assign(values.data(), values.data() + values.size());
+                check_mesh(mesh, "Mesh");
+            },
+            "values"_a,
+            "Give the spacing (V,) float32 of the points that a render places on this mesh, metres in the world: it "
+            "takes\n"
+            "the place of the material's.")
+        .def_prop_ro(
+            "spacing",
+            [](Mesh& mesh) -> nb::object {
+                if (mesh.spacing.empty()) return nb::none();
+                return nb::cast(view(mesh.spacing.data(), {mesh.spacing.size()}, nb::find(mesh)));
+            },
+            nb::sig("def spacing(self) -> numpy.ndarray | None"), "View of the points' spacing, or None.")
+        .def_prop_ro(
+            "rest",
+            [](Mesh& mesh) -> nb::object {
+                if (mesh.rest.empty()) return nb::none();
+                return nb::cast(view(&mesh.rest.data()->x, {mesh.rest.size(), 3}, nb::find(mesh)));
+            },
+            nb::sig("def rest(self) -> numpy.ndarray | None"), "View of the rest positions, or None.")
         .def_prop_ro(
             "normals", [](Mesh& mesh) { return view_primvar(mesh.normals, mesh); },
             nb::sig("def normals(self) -> numpy.ndarray | None"), "View of the normals, or None.")

@@ -226,15 +226,16 @@ void bind_overlay(nb::module_& module) {
         "size : of cells and features, distance of planes and bands. width : of lines, bubbles and bands.\n"
         "feather : over which edges fade. warp : bend of lines, of size. scales : of cells, octaves of frost.\n"
         "amount : how much there is. slope : -1..1, more where the surface faces `direction`. seed : another pattern.\n"
-        "mask : multiplies the pattern; a constant or a TextureLookup.\n\n"
+        "mask : multiplies the pattern; a constant or a TextureLookup. name : of its layers in a picture.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
         [](Overlay* self, const std::string& kind, const Triple& color, float opacity, float roughness,
            float scattering, float bump, float internal, float age_begin, float age_end, float size, float width,
            float feather, float warp, int scales, float amount, float slope, const Triple& direction,
-           std::uint32_t seed, const FloatInput& mask) {
+           std::uint32_t seed, const FloatInput& mask, const std::string& name) {
             Overlay made;
+            made.name = name;
             made.color = to_v3f(color);
             made.opacity = opacity;
             made.roughness = roughness;
@@ -261,8 +262,10 @@ void bind_overlay(nb::module_& module) {
         "internal"_a = preset.internal, "age_begin"_a = preset.age_begin, "age_end"_a = preset.age_end,
         "size"_a = pattern.size, "width"_a = pattern.width, "feather"_a = pattern.feather, "warp"_a = pattern.warp,
         "scales"_a = pattern.scales, "amount"_a = pattern.amount, "slope"_a = pattern.slope,
-        "direction"_a = from_v3f(pattern.direction), "seed"_a = pattern.seed, "mask"_a = FloatInput(1.0f));
-    cls.def_prop_ro("pattern", [](const Overlay& o) { return to_name(kPatternNames, o.pattern.kind); })
+        "direction"_a = from_v3f(pattern.direction), "seed"_a = pattern.seed, "mask"_a = FloatInput(1.0f),
+        "name"_a = "");
+    cls.def_rw("name", &Overlay::name)
+        .def_prop_ro("pattern", [](const Overlay& o) { return to_name(kPatternNames, o.pattern.kind); })
         .def_prop_rw(
             "color", [](const Overlay& o) { return from_v3f(o.color); },
             [](Overlay& o, const Triple& color) { o.color = to_v3f(color); })
@@ -337,7 +340,8 @@ void bind_ice(nb::module_& module) {
         "profile : 'multiple_scattering', 'photon_beam', 'normalized_diffusion', 'better_dipole' or 'dipole'.\n"
         "compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;\n"
         "    compensation_strength in [0, 1].\n"
-        "spacing : of the points, metres; 0 = from the mean free path.\n\n"
+        "spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's "
+        "vertices.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
@@ -346,7 +350,7 @@ void bind_ice(nb::module_& module) {
            float volume, float anisotropy, int priority, const std::vector<Overlay>& overlays, float age,
            const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
            bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
-           float compensation_strength, float spacing) {
+           float compensation_strength, const FloatInput& spacing) {
             IceMaterial model;
             model.medium = medium;
             model.roughness = to_input(roughness);
@@ -364,7 +368,7 @@ void bind_ice(nb::module_& module) {
             for (const Triple& color : ramp_colors) model.ramp.colors.push_back(to_v3f(color));
             model.compensation = {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
                                   compensation_limit, compensation_strength};
-            model.spacing = spacing;
+            model.spacing = to_input(spacing);
             model.profile = profile_named(profile, "IceMaterial");
             new (self) IceMaterial(std::move(model));
         },
@@ -373,9 +377,10 @@ void bind_ice(nb::module_& module) {
         "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "priority"_a = 0, "overlays"_a = std::vector<Overlay>(),
         "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
         "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
-        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = 0.0f);
+        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f));
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);
+    def_input(cls, "spacing", &IceMaterial::spacing);
     cls.def_rw("medium", &IceMaterial::medium)
         .def_rw("specular", &IceMaterial::specular)
         .def_rw("translucency", &IceMaterial::translucency)
@@ -394,7 +399,6 @@ void bind_ice(nb::module_& module) {
         .def_rw("priority", &IceMaterial::priority)
         .def_rw("overlays", &IceMaterial::overlays)
         .def_rw("age", &IceMaterial::age)
-        .def_rw("spacing", &IceMaterial::spacing)
         .def_prop_ro("ramp_distances", [](const IceMaterial& model) { return model.ramp.distances; })
         .def_prop_ro("ramp_colors",
                      [](const IceMaterial& model) {

@@ -2,6 +2,7 @@
 #include "frazil/bindings/bindings.h"
 #include "frazil/points/point_file.h"
 #include "frazil/points/poisson.h"
+#include "frazil/points/pose.h"
 #include "frazil/points/statistics.h"
 #include "frazil/points/tessellated.h"
 
@@ -62,9 +63,6 @@ void bind_points(nb::module_& module) {
                 return view(&raw(p.barycentrics)->x, {p.size(), 2}, nb::find(p));
             },
             "(N, 2) float32 in [0, 1]: the weights of the triangle's second and third corner.")
-        .def_prop_ro(
-            "triangle_areas", [](PointSet& p) { return view(raw(p.triangle_areas), {p.size()}, nb::find(p)); },
-            "(N,) float32, m²: the area of each point's triangle, which `on` needs.")
         .def_ro("spacing", &PointSet::spacing, "The distance asked for, metres; the largest where it varies.")
         .def(
             "save",
@@ -84,14 +82,14 @@ void bind_points(nb::module_& module) {
             "path"_a, "Read a file that save() wrote. OSError where it cannot be read.")
         .def(
             "on",
-            [](const PointSet& points, const Mesh& mesh) {
+            [](const PointSet& points, const Mesh& mesh, bool thin_walls) {
                 const nb::gil_scoped_release release;
-                return points_on(points, mesh);
+                return points_on(points, mesh, thin_walls);
             },
-            "mesh"_a,
-            "The same points, with the same ids, on another pose of the mesh that they were made on: positions, "
-            "normals\n"
-            "and areas follow their triangles. ValueError where the pose has fewer triangles.")
+            "mesh"_a, "thin_walls"_a = true,
+            "The same points, with the same ids, on another pose of the mesh that they were made on: positions and\n"
+            "normals follow their triangles, and each area is the pose's surface that is nearest to the point there.\n"
+            "ValueError where the pose has fewer triangles.")
         .def("__len__", &PointSet::size)
         .def("__repr__",
              [](const PointSet& p) { return str("PointSet(", p.size(), " points, spacing ", p.spacing, ")"); });
@@ -106,7 +104,9 @@ void bind_points(nb::module_& module) {
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
         return with_threads(threads, [&] {
-            return poisson_points(mesh, spacing, {seed, thin_walls, max_points}, &told);
+            return place_in_rest(mesh, thin_walls, [&](const Mesh& rest) {
+                return poisson_points(rest, spacing, {seed, thin_walls, max_points}, &told);
+            });
         });
     });
     place("poisson_points_varying", [](const Mesh& mesh, const FloatArray& spacing, std::uint32_t seed, bool thin_walls,
@@ -115,7 +115,9 @@ void bind_points(nb::module_& module) {
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
         return with_threads(threads, [&] {
-            return poisson_points(mesh, values, {seed, thin_walls, max_points}, &told);
+            return place_in_rest(mesh, thin_walls, [&](const Mesh& rest) {
+                return poisson_points(rest, values, {seed, thin_walls, max_points}, &told);
+            });
         });
     });
     place("poisson_points_by_count", [](const Mesh& mesh, std::uint64_t count, std::uint32_t seed, bool thin_walls,
@@ -123,7 +125,9 @@ void bind_points(nb::module_& module) {
         Progress told = make_progress(progress);
         const nb::gil_scoped_release release;
         return with_threads(threads, [&] {
-            return poisson_points_by_count(mesh, count, {seed, thin_walls, max_points}, &told);
+            return place_in_rest(mesh, thin_walls, [&](const Mesh& rest) {
+                return poisson_points_by_count(rest, count, {seed, thin_walls, max_points}, &told);
+            });
         });
     });
     nb::class_<PointStatistics>(module, "PointStatistics", "How good a point set is; distances in metres.")

@@ -70,6 +70,21 @@ nb::list compensations_of(const Film& film) {
     return rows;
 }
 
+nb::list overlays_of(const Film& film) {
+    nb::list rows;
+    for (const RenderedOverlay& overlay : film.overlays) {
+        nb::dict row;
+        row["name"] = overlay.name;
+        row["material"] = overlay.material;
+        row["opacity"] = overlay.opacity;
+        row["age"] = overlay.age;
+        row["age_begin"] = overlay.age_begin;
+        row["age_end"] = overlay.age_end;
+        rows.append(row);
+    }
+    return rows;
+}
+
 nb::dict stats_of(const RenderStats& stats) {
     nb::dict result;
     result["points"] = stats.points;
@@ -180,6 +195,7 @@ void bind_options(nb::module_& module) {
         .def_rw("max_bounces", &RenderOptions::max_bounces)
         .def_rw("spacing", &RenderOptions::spacing)
         .def_rw("spacing_scale", &RenderOptions::spacing_scale)
+        .def_rw("spacing_pixels", &RenderOptions::spacing_pixels)
         .def_rw("bake_samples", &RenderOptions::bake_samples)
         .def_rw("bake_error", &RenderOptions::bake_error)
         .def_rw("translucent_shadows", &RenderOptions::translucent_shadows)
@@ -282,6 +298,9 @@ void bind_render(nb::module_& module) {
         .def_prop_ro(
             "compensations", [](const RenderResult& self) { return compensations_of(self.film); },
             "list of dict, one per material of ice: material, mode, strength.")
+        .def_prop_ro(
+            "overlays", [](const RenderResult& self) { return overlays_of(self.film); },
+            "list of dict, one per overlay that has layers: name, material, opacity, age, age_begin, age_end.")
         .def_prop_ro(
             "stats", [](const RenderResult& self) { return stats_of(self.stats); },
             "dict: points, nodes, rays, gathers, dropped samples, seconds per stage.");

@@ -4,6 +4,7 @@
 
 #include "frazil/bindings/bindings.h"
 #include "frazil/render/emission.h"
+#include "frazil/render/motion.h"
 #include "frazil/render/scene.h"
 
 namespace frazil {
@@ -172,6 +173,32 @@ void bind_scene(nb::module_& module) {
         .def_ro("materials", &Scene::materials)
         .def_ro("objects", &Scene::objects)
         .def_ro("lights", &Scene::lights)
+        .def(
+            "set_motion", [](Scene& scene, const Scene& next) { scene.motion = motion_between(scene, next); }, "next"_a,
+            "Tell how the scene goes on, by the same scene a frame later: for the AOV motion. Objects are paired by "
+            "path.")
+        .def_prop_ro(
+            "motion",
+            [](const Scene& scene) -> nb::object {
+                if (!scene.motion) return nb::none();
+                nb::list matrices, positions;
+                for (const M44f& matrix : scene.motion->local_to_world) matrices.append(from_matrix(matrix));
+                for (const std::vector<V3f>& moved : scene.motion->positions) {
+                    auto* memory = new std::vector<V3f>(moved);
+                    nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<V3f>*>(p); });
+                    positions.append(
+                        nb::cast(nb::ndarray<nb::numpy, float>(memory->data(), {memory->size(), 3}, owner)));
+                }
+                nb::dict motion;
+                motion["matrices"] = matrices;
+                motion["positions"] = positions;
+                motion["camera"] = scene.motion->camera;
+                return motion;
+            },
+            nb::sig("def motion(self) -> dict | None"),
+            "What set_motion told: (4, 4) matrices of the objects, (V, 3) positions of the meshes (empty where they "
+            "stay)\n"
+            "and the camera; None without.")
         .def("__repr__", [](const Scene& scene) {
             return str("Scene(", scene.objects.size(), " objects, ", scene.meshes.size(), " meshes, ",
                        scene.materials.size(), " materials, ", scene.lights.size(), " lights)");

@@ -52,6 +52,31 @@ void check_mesh(const Mesh& mesh, const std::string& path) {
     check_primvar(mesh.normals, mesh, path, "normals");
     check_primvar(mesh.uvs, mesh, path, "uvs");
     check_primvar(mesh.colors, mesh, path, "colors");
+    if (!mesh.rest.empty() && mesh.rest.size() != mesh.positions.size()) {
+        throw ValueError(str(path, ": rest must have one position per vertex (", mesh.positions.size(), "), got ",
+                             mesh.rest.size(), ". Give the rest pose of the same mesh."));
+    }
+    if (!mesh.spacing.empty() && mesh.spacing.size() != mesh.positions.size()) {
+        throw ValueError(str(path, ": spacing must have one value per vertex (", mesh.positions.size(), "), got ",
+                             mesh.spacing.size(), ". Give one distance per vertex."));
+    }
+    for (std::size_t i = 0; i < mesh.spacing.size(); ++i) {
+        if (mesh.spacing[i] > 0.0f && std::isfinite(mesh.spacing[i])) continue;
+        throw ValueError(str(path, ": spacing must be > 0 and finite, got ", mesh.spacing[i], " at vertex ", i,
+                             ". It is in metres."));
+    }
+    for (std::size_t i = 0; i < mesh.rest.size(); ++i) {
+        if (is_finite(mesh.rest[i])) continue;
+        throw ValueError(str(path, ": rest must be finite, got NaN or infinity at vertex ", i,
+                             ". Clean the mesh where it was made."));
+    }
+}
+
+Mesh rest_pose(const Mesh& mesh) {
+    Mesh result;
+    result.positions = mesh.rest;
+    result.triangles = mesh.triangles;
+    return result;
 }
 
 V3d triangle_cross(const Mesh& mesh, std::size_t triangle) {
@@ -78,6 +103,7 @@ Mesh transformed(const Mesh& mesh, const M44f& local_to_world) {
     Mesh result = mesh;
     const M44f world_to_local = local_to_world.inverse();
     for (V3f& position : result.positions) position = position * local_to_world;
+    for (V3f& position : result.rest) position = position * local_to_world;
     for (V3f& normal : result.normals.values) normal = transform_normal(normal, world_to_local);
     const V3f x(local_to_world[0][0], local_to_world[0][1], local_to_world[0][2]);
     const V3f y(local_to_world[1][0], local_to_world[1][1], local_to_world[1][2]);
@@ -141,7 +167,11 @@ Mesh submesh(const Mesh& mesh, const std::vector<std::int32_t>& triangles) {
         }
         result.triangles.push_back(triangle);
     }
-    for (const std::int32_t v : kept_vertices) result.positions.push_back(mesh.positions[v]);
+    for (const std::int32_t v : kept_vertices) {
+        result.positions.push_back(mesh.positions[v]);
+        if (!mesh.rest.empty()) result.rest.push_back(mesh.rest[v]);
+        if (!mesh.spacing.empty()) result.spacing.push_back(mesh.spacing[v]);
+    }
     result.normals = select(mesh.normals, triangles, kept_vertices);
     result.uvs = select(mesh.uvs, triangles, kept_vertices);
     result.colors = select(mesh.colors, triangles, kept_vertices);

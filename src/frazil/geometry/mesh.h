@@ -54,6 +54,10 @@ struct Mesh {
     Primvar<V3f> normals;  // unit length; empty = faceted
     Primvar<V2f> uvs;
     Primvar<Rgb> colors;  // USD displayColor
+    // Positions in a pose that does not move, one per vertex, or none: where points are placed, so that they stay on a
+    // moving mesh (USD primvar rest or Pref).
+    std::vector<V3f> rest;
+    std::vector<float> spacing;  // of points, metres in the world, one per vertex; none = by material
 
     std::size_t triangle_count() const { return triangles.size(); }
 };
@@ -71,7 +75,10 @@ double surface_area(const Mesh& mesh);
 
 Box3f bounds(const Mesh& mesh);
 
-// Positions and normals moved by local_to_world; a mirroring matrix also flips the winding, so that outside stays
+// The mesh in its rest pose: without attributes, as points need it. The mesh must have one.
+Mesh rest_pose(const Mesh& mesh);
+
+// Positions, rest positions and normals moved by local_to_world; a mirroring matrix also flips the winding, so that outside stays
 // outside.
 Mesh transformed(const Mesh& mesh, const M44f& local_to_world);
 

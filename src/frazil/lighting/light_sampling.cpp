@@ -1,6 +1,7 @@
 #include "frazil/lighting/light_sampling.h"
 
 #include <algorithm>
+#include <map>
 
 namespace frazil {
 namespace {
@@ -46,31 +47,34 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
         }
     }
 
+    std::vector<PickEntry> all;
+    std::vector<std::string> groups;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        all.push_back({int(i), 1.0f});
+        groups.push_back(lights[i].group);
+    }
+    world->all = std::make_unique<const LightPicker>(world->lights, all, world->table, world->link_of_light);
     // Uses that weigh the lights alike share a picker.
-    std::vector<std::pair<std::vector<float>, std::shared_ptr<const LightPicker>>> made;
-    const auto picker_by = [&](const auto& scale_of) {
+    std::map<std::vector<float>, std::shared_ptr<const GroupPicker>> made;
+    for (std::size_t use = 0; use < kLightUseCount; ++use) {
         std::vector<float> scales;
-        for (const Light& light : lights) scales.push_back(scale_of(light));
-        for (const auto& [known, picker] : made) {
-            if (known == scales) return picker;
-        }
         std::vector<PickEntry> entries;
-        for (std::size_t i = 0; i < scales.size(); ++i) {
+        for (std::size_t i = 0; i < lights.size(); ++i) {
+            scales.push_back(use_scale(lights[i], LightUse(use)));
             if (scales[i] > 0.0f) entries.push_back({int(i), scales[i]});
         }
-        made.emplace_back(
-            scales, std::make_shared<const LightPicker>(world->lights, entries, world->table, world->link_of_light));
-        return made.back().second;
-    };
-    world->all = picker_by([](const Light&) { return 1.0f; });
-    for (std::size_t use = 0; use < kLightUseCount; ++use) {
-        world->pickers[use] = picker_by([&](const Light& light) { return use_scale(light, LightUse(use)); });
+        auto& picker = made[scales];
+        if (!picker) {
+            picker =
+                std::make_shared<const GroupPicker>(world->lights, entries, world->table, world->link_of_light, groups);
+        }
+        world->pickers[use] = picker;
     }
     world_ = world;
 }
 
 LightPick LightSampler::pick(const LightReceiver& receiver, float u, LightUse use) const {
-    thread_local LightPicker::Weights weights;
+    thread_local GroupPicker::Weights weights;
     picker(use).weigh(receiver, weights);
     return picker(use).pick(receiver, weights, u);
 }
@@ -98,7 +102,7 @@ void LightSampler::sample_many(int light, const V3f& position, std::span<const V
 void LightSampler::intersect(const LightReceiver& receiver, const V3f& origin, const V3f& direction, float t_max,
                              std::vector<LightHit>& hits, LightUse use) const {
     thread_local std::vector<int> candidates;
-    thread_local LightPicker::Weights weights;
+    thread_local GroupPicker::Weights weights;
     candidates.clear();
     world().all->find_along(origin, direction, t_max, candidates);
     // Light from infinity, and lights that shine through what is in the way.
@@ -130,7 +134,7 @@ bool LightSampler::hit_object(const LightReceiver& receiver, std::uint32_t objec
     hit.light = light_of_object(object);
     if (hit.light < 0 || !is_linked(hit.light, receiver.object)) return false;
     if (!world_light(hit.light).hit_triangle(triangle, direction, t, hit)) return false;
-    thread_local LightPicker::Weights weights;
+    thread_local GroupPicker::Weights weights;
     picker(use).weigh(receiver, weights);
     hit.pdf *= picker(use).probability(receiver, weights, hit.light);
     return true;

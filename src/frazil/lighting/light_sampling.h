@@ -1,6 +1,6 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: one light picked per sample by the irradiance that it can give (light_picker.h), then a direction on it
-//   (world_light.h).
+// Model: one light picked per sample: its group evenly (group_picker.h), in it by the irradiance that a light can give
+//   (light_picker.h), then a direction on it (world_light.h).
 // Units: pdf per steradian, the pick included.
 // Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose multipliers of the
 //   wanted use are 0, or that is not linked to the receiver's object, is never picked.
@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/lighting/group_picker.h"
 #include "frazil/lighting/light.h"
-#include "frazil/lighting/light_picker.h"
 #include "frazil/lighting/linking.h"
 #include "frazil/lighting/world_light.h"
 
@@ -88,11 +88,11 @@ class LightSampler {
         std::vector<std::uint8_t> is_plain;
         std::vector<int> odd_shadows;  // the lights with extent that are not plain
         std::vector<int> light_of_object;
-        std::array<std::shared_ptr<const LightPicker>, kLightUseCount> pickers;
-        std::shared_ptr<const LightPicker> all;  // whatever the multipliers: for rays that run into lights
+        std::array<std::shared_ptr<const GroupPicker>, kLightUseCount> pickers;
+        std::unique_ptr<const LightPicker> all;  // whatever the multipliers: for rays that run into lights
     };
     const World& world() const { return *world_; }
-    const LightPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
+    const GroupPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
 
     std::vector<Light> lights_;
     std::shared_ptr<const World> world_;

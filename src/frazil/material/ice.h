@@ -33,7 +33,8 @@ struct IceMaterial {
     MaterialInput<Rgb> tint{Rgb(1.0f), {}};  // multiplies what leaves the core
     Ramp ramp;
     Compensation compensation;
-    float spacing = 0.0f;  // of the points, metres; 0 = from the mean free path
+    // Of the points, metres; 0 = from the mean free path. A texture is read at the mesh's vertices.
+    MaterialInput<float> spacing{0.0f, {}};
 
     // Whether fracture planes may be seen inside.
     bool has_sheets() const {

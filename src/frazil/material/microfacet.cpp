@@ -38,6 +38,12 @@ float alpha_from_roughness(float roughness) {
     return std::max(r * r, kMinAlpha);
 }
 
+float blurred_roughness(float roughness, float blur) {
+    if (blur == 0.0f) return roughness;
+    const float alpha = alpha_from_roughness(roughness);
+    return std::sqrt(std::min(1.0f, std::sqrt(alpha * alpha + blur * blur)));
+}
+
 float fresnel_f0(float eta) {
     const float r = (eta - 1.0f) / (eta + 1.0f);
     return r * r;

@@ -17,6 +17,8 @@ namespace frazil {
 
 // roughness in [0, 1], clamped; alpha in [1e-4, 1].
 float alpha_from_roughness(float roughness);
+// The roughness of a lobe that is blurred by another of `blur` (an alpha): alphas add in quadrature.
+float blurred_roughness(float roughness, float blur);
 
 // F0 of a dielectric boundary: ((eta-1)/(eta+1))².
 float fresnel_f0(float eta);

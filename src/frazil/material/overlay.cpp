@@ -30,26 +30,34 @@ float age_weight(const Overlay& overlay, float age) {
     return t * t * (3.0f - 2.0f * t);
 }
 
+namespace {
+
+// An overlay's opacity where its pattern is full.
+float strength_at(const Overlay& overlay, float age, const V2f& st) {
+    const float strength = overlay.opacity * age_weight(overlay, age);
+    return strength > 0.0f ? strength * std::clamp(eval_float(overlay.mask, st), 0.0f, 1.0f) : 0.0f;
+}
+
+}  // namespace
+
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
                        const V2f& st, bool with_slope) {
     Covering all;
     all.roughness = roughness;
     for (const Overlay& overlay : overlays) {
-        const float strength = overlay.opacity * age_weight(overlay, age);
+        const float strength = strength_at(overlay, age, st);
         if (!(strength > 0.0f)) continue;
         PatternPoint at = point;
-        const float drawn = std::clamp(eval_float(overlay.mask, st), 0.0f, 1.0f);
-        if (!(drawn > 0.0f)) continue;
         const float mask = eval_pattern(overlay.pattern, at);
         if (with_slope && overlay.bump != 0.0f && mask > 0.0f) {
             const float step = std::max(point.footprint, 0.25f * overlay.pattern.width + 1e-5f);
             for (int axis = 0; axis < 3; ++axis) {
                 at.position = point.position;
                 at.position[axis] += step;
-                all.slope[axis] += (eval_pattern(overlay.pattern, at) - mask) * drawn * strength * overlay.bump / step;
+                all.slope[axis] += (eval_pattern(overlay.pattern, at) - mask) * strength * overlay.bump / step;
             }
         }
-        const float opacity = strength * drawn * mask;
+        const float opacity = strength * mask;
         if (!(opacity > 0.0f)) continue;
         const float scattered = opacity * overlay.scattering;
         all.covered = 1.0f - (1.0f - all.covered) * (1.0f - opacity);
@@ -59,6 +67,41 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
         all.roughness += (overlay.roughness - all.roughness) * opacity;
     }
     return all;
+}
+
+std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
+                                           const V2f& st) {
+    std::vector<float> opacity(overlays.size());
+    for (std::size_t k = 0; k < overlays.size(); ++k) {
+        const float strength = strength_at(overlays[k], age, st);
+        if (strength > 0.0f) opacity[k] = strength * eval_pattern(overlays[k].pattern, point);
+    }
+    std::vector<CoveringSlope> slopes(overlays.size());
+    for (std::size_t k = 0; k < overlays.size(); ++k) {
+        if (!(opacity[k] > 0.0f)) continue;
+        // As eval_overlays lays them over one another, overlay k by its derivative.
+        CoveringSlope& slope = slopes[k];
+        Rgb below(0.0f), tint(1.0f);
+        float bare = 1.0f, entering = 1.0f;  // but for overlay k
+        for (std::size_t j = 0; j < overlays.size(); ++j) {
+            const Overlay& overlay = overlays[j];
+            const float scattered = opacity[j] * overlay.scattering;
+            if (j == k) {
+                slope.reflectance = (overlay.color - below) * scattered;
+                tint *= (overlay.color - Rgb(1.0f)) * opacity[j];
+                continue;
+            }
+            bare *= 1.0f - opacity[j];
+            entering *= 1.0f - scattered;
+            if (j < k) below = below * (1.0f - scattered) + overlay.color * scattered;
+            if (j > k) slope.reflectance *= 1.0f - scattered;
+            tint *= Rgb(1.0f) - (Rgb(1.0f) - overlay.color) * opacity[j];
+        }
+        slope.tint = tint;
+        slope.covered = opacity[k] * bare;
+        slope.scattered = opacity[k] * overlays[k].scattering * entering;
+    }
+    return slopes;
 }
 
 }  // namespace frazil

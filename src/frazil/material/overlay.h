@@ -9,6 +9,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "frazil/material/pattern.h"
 #include "frazil/material/texture.h"
@@ -16,6 +17,7 @@
 namespace frazil {
 
 struct Overlay {
+    std::string name;                    // of its layers in a picture; empty = its number in the material, from 1
     Rgb color = Rgb(0.9f, 0.95f, 1.0f);  // of what is scattered, 0..1
     float opacity = 1.0f;                // where the mask is 1
     float roughness = 0.5f;              // of the surface there
@@ -47,5 +49,15 @@ struct Covering {
 // `roughness` is the bare surface's. The slope is left 0 unless `with_slope`.
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
                        const V2f& st, bool with_slope);
+
+// How a covering changes with one overlay's opacity: derivatives by its logarithm.
+struct CoveringSlope {
+    float covered = 0.0f, scattered = 0.0f;
+    Rgb reflectance = Rgb(0.0f), tint = Rgb(0.0f);
+};
+
+// One for each overlay.
+std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
+                                           const V2f& st);
 
 }  // namespace frazil

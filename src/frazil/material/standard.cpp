@@ -16,9 +16,9 @@ Rgb schlick_average(const Rgb& f0) {
 
 }  // namespace
 
-StandardBsdf::StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color) {
+StandardBsdf::StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color, float blur) {
     const Rgb color = clamp01(material.uses_display_color ? display_color : eval_color(material.diffuse_color, st));
-    alpha_ = alpha_from_roughness(eval_float(material.roughness, st));
+    alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.roughness, st), blur));
     if (material.use_specular_workflow) {
         diffuse_ = color;
         f0_ = clamp01(eval_color(material.specular_color, st));
@@ -28,7 +28,7 @@ StandardBsdf::StandardBsdf(const StandardMaterial& material, const V2f& st, cons
         f0_ = Rgb(fresnel_f0(material.ior)) * (1.0f - metallic) + color * metallic;
     }
     clearcoat_ = std::clamp(eval_float(material.clearcoat, st), 0.0f, 1.0f);
-    clearcoat_alpha_ = alpha_from_roughness(eval_float(material.clearcoat_roughness, st));
+    clearcoat_alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.clearcoat_roughness, st), blur));
     clearcoat_f0_ = fresnel_f0(material.ior);
     emission_ = eval_color(material.emissive_color, st);
     opacity_ = std::clamp(eval_float(material.opacity, st), 0.0f, 1.0f);

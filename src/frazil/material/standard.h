@@ -42,7 +42,9 @@ struct BsdfSample {
 class StandardBsdf {
   public:
     // `display_color` replaces the diffuse colour where the material asks for it.
-    StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color = Rgb(0.18f));
+    // `blur` is an alpha that makes the glossy lobes broader.
+    StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color = Rgb(0.18f),
+                 float blur = 0.0f);
 
     // Both zero unless wo and wi lie above the surface.
     BsdfValue eval(const V3f& wo, const V3f& wi) const;

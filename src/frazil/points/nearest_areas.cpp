@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "frazil/base/parallel.h"
+#include "frazil/points/fixed_point_sums.h"
 #include "frazil/points/side.h"
 
 namespace frazil {
@@ -12,23 +13,6 @@ namespace {
 
 constexpr std::size_t kTileGrain = 8;
 constexpr double kLongestEdge = 3.0;  // of a fragment, in spacings: larger ones share more of the work per point
-
-// Sums that do not depend on the order of their terms.
-class FixedPointSums {
-  public:
-    FixedPointSums(std::size_t count, double total)
-        : quantum_(std::ldexp(total, -61)), inverse_(1.0 / quantum_), sums_(count, 0) {}
-
-    void add(std::size_t index, double value) {
-        std::atomic_ref<std::int64_t>(sums_[index])
-            .fetch_add(static_cast<std::int64_t>(value * inverse_), std::memory_order_relaxed);
-    }
-    double at(std::size_t index) const { return static_cast<double>(sums_[index]) * quantum_; }
-
-  private:
-    double quantum_, inverse_;
-    std::vector<std::int64_t> sums_;
-};
 
 // Shares out the fragments of one tile; one per thread, which keeps its memory.
 class TileSharer {

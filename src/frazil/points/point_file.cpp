@@ -21,13 +21,12 @@ struct Row {
     float area;
     std::int32_t triangle;
     V2f uv;
-    float triangle_area;
 };
 #pragma pack(pop)
-static_assert(sizeof(Row) == 44);
+static_assert(sizeof(Row) == 40);
 
-constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "area", "triangle", "u", "v", "triangle_area"};
-constexpr int kFields = 11;
+constexpr const char* kNames[] = {"x", "y", "z", "nx", "ny", "nz", "area", "triangle", "u", "v"};
+constexpr int kFields = 10;
 
 std::size_t type_size(const std::string& type) {
     if (type == "char" || type == "uchar" || type == "int8" || type == "uint8") return 1;
@@ -110,8 +109,8 @@ void save_points(const PointSet& points, const std::string& path) {
         rows.resize(std::min(kRowsAtOnce, points.size() - begin));
         for (std::size_t i = 0; i < rows.size(); ++i) {
             const std::size_t p = begin + i;
-            rows[i] = {points.positions[p], points.normals[p],      points.areas[p],
-                       points.triangles[p], points.barycentrics[p], points.triangle_areas[p]};
+            rows[i] = {points.positions[p], points.normals[p], points.areas[p], points.triangles[p],
+                       points.barycentrics[p]};
         }
         file.write(reinterpret_cast<const char*>(rows.data()), static_cast<std::streamsize>(rows.size() * sizeof(Row)));
     }
@@ -153,7 +152,6 @@ PointSet load_points(const std::string& path) {
             points.areas[first + i] = row.area;
             points.triangles[first + i] = row.triangle;
             points.barycentrics[first + i] = row.uv;
-            points.triangle_areas[first + i] = row.triangle_area;
         }
     }
     return points;

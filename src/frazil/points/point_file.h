@@ -1,5 +1,5 @@
 // Point sets as binary PLY files, which every geometry tool opens.
-// Model: one vertex a point with x y z, nx ny nz, area, triangle, u v (barycentrics), triangle_area; the spacing in a comment.
+// Model: one vertex a point with x y z, nx ny nz, area, triangle, u v (barycentrics); the spacing in a comment.
 // Units: metres, m².
 // Valid: little-endian files with these properties in any order, and others, which are skipped.
 // Not: ASCII and big-endian PLY; meshes.

@@ -20,19 +20,12 @@ struct PointSet {
     std::vector<float> areas;
     std::vector<std::int32_t> triangles;
     std::vector<V2f> barycentrics;  // of the triangle's second and third corner
-    // The area of each point's triangle in the pose that `areas` are for: what areas follow when the mesh moves.
-    std::vector<float> triangle_areas;
-    double spacing = 0.0;  // the largest, where it varies
+    double spacing = 0.0;           // the largest, where it varies
 
     std::size_t size() const { return positions.size(); }
 };
 
 // Make room for `count` points.
 void resize(PointSet& points, std::size_t count);
-
-// The same points on another pose of their mesh: positions and normals follow their triangles, ids stay. Each area grows
-// as its triangle does, and all are scaled alike, so that they sum to the pose's. ValueError where the pose has too few
-// triangles.
-PointSet points_on(const PointSet& points, const Mesh& pose);
 
 }  // namespace frazil

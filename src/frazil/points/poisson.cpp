@@ -47,7 +47,7 @@ Extent measure(const Mesh& mesh, const SpacingField& spacing) {
     });
 }
 
-PointSet assemble(const Mesh& mesh, std::vector<std::vector<Dart>>& darts, std::vector<float> areas) {
+PointSet assemble(std::vector<std::vector<Dart>>& darts, std::vector<float> areas) {
     std::vector<std::size_t> first(darts.size() + 1, 0);
     for (std::size_t i = 0; i < darts.size(); ++i) first[i + 1] = first[i] + darts[i].size();
     PointSet points;
@@ -60,7 +60,6 @@ PointSet assemble(const Mesh& mesh, std::vector<std::vector<Dart>>& darts, std::
                 points.positions[at] = dart.position;
                 points.normals[at] = dart.normal;
                 points.triangles[at] = dart.triangle;
-                points.triangle_areas[at] = static_cast<float>(0.5 * triangle_cross(mesh, dart.triangle).length());
                 points.barycentrics[at++] = dart.uv;
             }
             std::vector<Dart>().swap(darts[tile]);
@@ -139,7 +138,7 @@ Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, cons
 PointSet finish(const Mesh& mesh, Placed& placed, double spacing, bool thin_walls, Progress* progress) {
     std::vector<float> areas =
         nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls, placed.darts, progress);
-    PointSet points = assemble(mesh, placed.darts, std::move(areas));
+    PointSet points = assemble(placed.darts, std::move(areas));
     points.spacing = spacing;
     return points;
 }

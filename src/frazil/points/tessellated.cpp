@@ -58,7 +58,6 @@ PointSet tessellated_points(const Mesh& mesh, double edge_length) {
                 points.positions[at] = V3f(a * (1.0 - u - v) + b * u + c * v);
                 points.normals[at] = normal;
                 points.areas[at] = area;
-                points.triangle_areas[at] = static_cast<float>(whole);
                 points.triangles[at] = static_cast<std::int32_t>(i);
                 points.barycentrics[at++] = V2f(float(u), float(v));
             };

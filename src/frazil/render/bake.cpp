@@ -1,12 +1,14 @@
 #include "frazil/render/bake.h"
 
+#include <Imath/ImathMatrixAlgo.h>
+
 #include <algorithm>
-#include <array>
 #include <map>
 
 #include "frazil/base/error.h"
 #include "frazil/points/point_budget.h"
 #include "frazil/points/poisson.h"
+#include "frazil/points/pose.h"
 #include "frazil/render/bounces.h"
 #include "frazil/render/stopwatch.h"
 
@@ -21,67 +23,139 @@ constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
 constexpr std::size_t kMostPlaces = 32'000'000;
 // Spacing over mean free path beyond which single points show.
 constexpr float kCoarse = 4.0f;
+// How much finer points may be where a texture is dark, which may be black by mistake.
+constexpr float kFinestByTexture = 64.0f;
+// How much coarser points may be where the camera is far.
+constexpr float kCoarsestByPixels = 64.0f;
 
-// Lengths and angles of the matrix's axes: equal for matrices that differ by a rotation, reflection or move.
-std::array<float, 6> metric(const M44f& m) {
-    const V3f x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
-    return {x.dot(x), y.dot(y), z.dot(z), x.dot(y), y.dot(z), z.dot(x)};
-}
-
-bool is_same_metric(const std::array<float, 6>& a, const std::array<float, 6>& b) {
-    const float scale = a[0] + a[1] + a[2];
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        if (std::abs(a[i] - b[i]) > 1e-5f * scale) return false;
+// The matrix without its rotation, reflection and move: the symmetric S of linear part = S R. Rounded, so that it does not
+// change where a body only turns, and with it the points.
+M44f stretch_of(const M44f& m) {
+    Imath::M33d gram(0.0);
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            for (int k = 0; k < 3; ++k) gram[i][j] += double(m[i][k]) * m[j][k];
+        }
     }
-    return true;
+    Imath::V3d squares;
+    Imath::M33d axes;
+    Imath::jacobiEigenSolver(gram, squares, axes);
+    const double largest = std::sqrt(std::max({squares.x, squares.y, squares.z, 1e-300}));
+    const double step = std::ldexp(1.0, std::ilogb(largest) - 19);
+    M44f result;
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            double sum = 0.0;
+            for (int k = 0; k < 3; ++k) sum += axes[i][k] * std::sqrt(std::max(0.0, squares[k])) * axes[j][k];
+            result[i][j] = static_cast<float>(std::round(sum / step) * step);
+        }
+    }
+    return result;
 }
 
-PointSet moved(const PointSet& points, const M44f& rigid) {
+PointSet moved(const PointSet& points, const M44f& matrix) {
     PointSet result = points;
-    const M44f inverse = rigid.inverse();
-    for (V3f& position : result.positions) position = position * rigid;
+    const M44f inverse = matrix.inverse();
+    for (V3f& position : result.positions) position = position * matrix;
     for (V3f& normal : result.normals) normal = transform_normal(normal, inverse);
     return result;
 }
 
-// A point set in the world, and the placement that it was made for.
-struct SharedPoints {
-    float spacing;
-    M44f local_to_world;
-    PointSet points;
+// The spacing at each vertex in the world, where it varies: the mesh's own or a texture's, and no finer than the pixels asked for. Empty
+// where it is the same all over.
+std::vector<float> vertex_spacing(const Scene& scene, const Object& object, float spacing,
+                                  const RenderOptions& options) {
+    const Mesh& mesh = scene.meshes[object.mesh];
+    const auto& texture = std::get<IceMaterial>(scene.materials[object.material].model).spacing;
+    std::vector<float> result;
+    if (options.spacing == 0.0f && !mesh.spacing.empty()) {
+        result = mesh.spacing;
+    } else if (options.spacing == 0.0f && texture.lookup.texture && !mesh.uvs.is_empty()) {
+        result.assign(mesh.positions.size(), 0.0f);
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+            for (int k = 0; k < 3; ++k) {
+                const V2f uv = mesh.uvs.at(mesh.triangles, std::uint32_t(i), V2f(k == 1, k == 2));
+                result[mesh.triangles[i][k]] = eval_float(texture, uv);
+            }
+        }
+        const float largest = *std::max_element(result.begin(), result.end());
+        if (!(largest > 0.0f)) return {};
+        for (float& value : result) value = std::max(value, largest / kFinestByTexture);
+    }
+    for (float& value : result) value *= options.spacing_scale;
+    if (options.spacing_pixels == 0.0f) return result;
+    if (result.empty()) result.assign(mesh.positions.size(), spacing);
+    const PixelCone cone = pixel_cone(scene.camera, options.width, options.height);
+    const V3f eye = V3f(0.0f) * scene.camera.camera_to_world;
+    for (std::size_t i = 0; i < result.size(); ++i) {
+        const float distance = (mesh.positions[i] * object.local_to_world - eye).length();
+        const float pixels = options.spacing_pixels * 2.0f * (cone.radius + cone.spread * distance);
+        result[i] = std::clamp(pixels, result[i], kCoarsestByPixels * result[i]);
+    }
+    return result;
+}
+
+// A mesh in a size and shape that it has in the world, turned and moved nowhere yet, and its points: what all objects
+// share that place it so, and all frames in which it only moves.
+struct Shape {
+    M44f stretch;
+    double area;
+    std::map<float, PointSet> points;  // by spacing
 };
 
-// The points of an object, taken from another placement of the same mesh where that is the same but for a rigid motion.
-PointSet points_of(const Object& object, const Mesh& world_mesh, float spacing, std::uint32_t seed,
-                   std::multimap<std::uint32_t, SharedPoints>& shared, Progress* progress) {
-    const auto [begin, end] = shared.equal_range(object.mesh);
-    for (auto it = begin; it != end; ++it) {
-        const SharedPoints& other = it->second;
-        if (other.spacing == spacing && is_same_metric(metric(other.local_to_world), metric(object.local_to_world))) {
-            return moved(other.points, other.local_to_world.inverse() * object.local_to_world);
-        }
+class Shapes {
+  public:
+    explicit Shapes(const Scene& scene) : scene_(scene) {}
+
+    Shape& of(const Object& object) {
+        const M44f stretch = stretch_of(object.local_to_world);
+        const auto [begin, end] = shapes_.equal_range(object.mesh);
+        const auto known = std::find_if(begin, end, [&](const auto& entry) { return entry.second.stretch == stretch; });
+        if (known != end) return known->second;
+        const Mesh mesh = transformed(scene_.meshes[object.mesh], stretch);
+        return shapes_.emplace(object.mesh, Shape{stretch, surface_area(mesh), {}})->second;
     }
-    PoissonOptions options;
-    options.seed = seed;
-    const PointSet points = poisson_points(world_mesh, spacing, options, progress);
-    shared.emplace(object.mesh, SharedPoints{spacing, object.local_to_world, points});
-    return points;
-}
+
+    // In the world, for an object of that shape.
+    PointSet points_of(const Object& object, Shape& shape, float spacing, const RenderOptions& options,
+                       Progress* progress) {
+        const M44f to_world = shape.stretch.inverse() * object.local_to_world;
+        const std::vector<float> varying = vertex_spacing(scene_, object, spacing, options);
+        if (!varying.empty()) return moved(place(object, shape, varying, options, progress), to_world);
+        auto known = shape.points.find(spacing);
+        if (known == shape.points.end()) {
+            known = shape.points.emplace(spacing, place(object, shape, spacing, options, progress)).first;
+        }
+        return moved(known->second, to_world);
+    }
+
+  private:
+    template <class Spacing>
+    PointSet place(const Object& object, const Shape& shape, const Spacing& spacing, const RenderOptions& options,
+                   Progress* progress) const {
+        const PoissonOptions poisson{options.seed, true, 0};
+        const Mesh mesh = transformed(scene_.meshes[object.mesh], shape.stretch);
+        return place_in_rest(mesh, poisson.thin_walls,
+                             [&](const Mesh& rest) { return poisson_points(rest, spacing, poisson, progress); });
+    }
+
+    const Scene& scene_;
+    std::multimap<std::uint32_t, Shape> shapes_;
+};
 
 // The points of every body that has none yet.
 void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies, const RenderOptions& options,
                 std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress) {
     Stopwatch watch(stats.seconds["points"]);
-    std::multimap<std::uint32_t, SharedPoints> shared;
+    Shapes shapes(scene);
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() > 0) continue;
         const Object& object = scene.objects[i];
         const IceMaterial& material = *bodies[i]->material;
-        const Mesh world_mesh = transformed(scene.meshes[object.mesh], object.local_to_world);
-        const double area = surface_area(world_mesh);
-        if (!(area > 0.0)) continue;
+        Shape& shape = shapes.of(object);
+        if (!(shape.area > 0.0)) continue;
         try {
-            const float spacing = point_spacing(material, area, options);
+            const float spacing = point_spacing(material, shape.area, options);
             const float mean_free_path = 1.0f / max_component(material.medium.sigma_s_prime + material.medium.sigma_a);
             if (spacing > kCoarse * mean_free_path) {
                 stats.warnings.push_back(
@@ -89,7 +163,7 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
                         " mean free paths: single points may show. Set the ",
                         "material's spacing, or a longer mean free path for a body of this size."));
             }
-            lit[i].points = points_of(object, world_mesh, spacing, options.seed, shared, progress);
+            lit[i].points = shapes.points_of(object, shape, spacing, options, progress);
         } catch (const ValueError& error) {
             throw ValueError(str(object.path, ": ", error.what()));
         }
@@ -158,7 +232,7 @@ void copy_group(const std::vector<Value>& source, std::size_t from, std::size_t 
 
 float point_spacing(const IceMaterial& material, double area, const RenderOptions& options) {
     float spacing = options.spacing;
-    if (spacing == 0.0f) spacing = material.spacing;
+    if (spacing == 0.0f) spacing = material.spacing.value;
     if (spacing == 0.0f) {
         const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
         const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);

@@ -1,6 +1,7 @@
 // What is baked once per shot and serves every camera: the points of each translucent body and the light that enters.
 // Model: points -> irradiance -> bounces (bounces.h), per light group; a group's light does not depend on the others.
-//   Objects that place the same mesh in the same size share one Poisson set, moved to each.
+//   Objects that place the same mesh in the same size share one Poisson set, moved to each, and so do the frames in which
+//   an object only moves; a mesh with a rest pose has its points from there.
 // Units: metres, world space; irradiance in the lights' unit.
 // Valid: for the scene and options that it was made with; the same bits for any number of threads.
 // Not: files (the Python package's), the tree (bodies.h).

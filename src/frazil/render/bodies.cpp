@@ -55,7 +55,8 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         const double traced = is_traced ? material->volume : 0.0;
         auto& profile = profiles[{material, is_traced}];
         if (!profile) profile = make_profile(material->profile, medium, 1.0 - traced);
-        bodies[i] = std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr});
+        bodies[i] =
+            std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr, nullptr});
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
@@ -69,7 +70,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
 
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
                                                      const RayScene& ray_scene) {
-    if (body.material->compensation.mode != CompensationMode::depth || points.size() == 0) return nullptr;
+    if (points.size() == 0) return nullptr;
     return std::make_unique<const PointTree>(
         points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once), 1, body.profile);
 }
@@ -89,12 +90,15 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
 }
 
 Rgb Body::gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const {
-    const Rgb area = compensation_gain(compensation, coverage, total_reflectance);
-    return thin ? area * (Rgb(1.0f) + (*thin - Rgb(1.0f)) * compensation.strength) : area;
+    if (!thin) return compensation_gain(compensation, coverage, total_reflectance);
+    Compensation full = compensation;
+    full.strength = 1.0f;
+    const Rgb gain = compensation_gain(full, coverage, total_reflectance) * *thin;
+    return Rgb(1.0f) + (gain - Rgb(1.0f)) * compensation.strength;
 }
 
-void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
-    const Compensation& compensation = body.material->compensation;
+void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered) {
+    const Compensation compensation;
     for (std::size_t i = 0; i < gathered.coverage.size(); ++i) {
         const Rgb gain = body.gain(compensation, gathered.coverage[i], gains.empty() ? nullptr : &gains[i]);
         for (std::size_t g = 0; g < gathered.groups; ++g) gathered.exitance[i * gathered.groups + g] *= gain;
@@ -108,7 +112,7 @@ std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t objec
 }
 
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
@@ -117,7 +121,9 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (!cells && !lit[i].moments.empty()) cells = cells_of_body(scene, i, lit[i].points);
         bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
                                                             body.material->ramp, cells.get(), lit[i].moments);
-        bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
+        if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
+            bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
+        }
         bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();

@@ -22,9 +22,10 @@ struct Body {
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
-    Rgb total_reflectance = Rgb(0.0f);           // Rd_total
-    std::unique_ptr<const PointTree> tree;       // none where the object has no surface
-    std::unique_ptr<const PointTree> thickness;  // make_thickness_tree
+    Rgb total_reflectance = Rgb(0.0f);              // Rd_total
+    std::unique_ptr<const PointTree> tree;          // none where the object has no surface
+    std::unique_ptr<const PointTree> thickness;     // make_thickness_tree
+    std::unique_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
@@ -46,7 +47,7 @@ struct Body {
 // A body's points and the light that enters them.
 struct LitPoints {
     PointSet points;
-    std::vector<Rgb> irradiance;   // (N, groups)
+    std::vector<Rgb> irradiance;    // (N, groups)
     std::vector<V3f> moments = {};  // (N, groups), as in Irradiance; empty where light was baked at the points alone
     std::shared_ptr<const Cells> cells = nullptr;  // of the points; made anew where they are wanted and not here
 };
@@ -54,14 +55,15 @@ struct LitPoints {
 // The cells of an object's points.
 std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const PointSet& points);
 
-// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where the compensation has no use for it.
+// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
                                                      const RayScene& ray_scene);
 // The mean gain around each position, from such a tree; empty without one.
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options);
-// Scale the exitance that was gathered as the body's material asks for; `gains` as above.
-void compensate(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
+// Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
+// seen. So bounces keep energy, and a picture's compensation can be changed exactly after its render. `gains` as above.
+void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
 // What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
 // absorbs; others nothing.
 std::vector<Passage> passages_of(const Scene& scene);
@@ -69,8 +71,9 @@ std::vector<Passage> passages_of(const Scene& scene);
 // One entry per object of the scene, without trees; null for those that are not ice.
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
-// Give every body the tree of its points, (N, groups) of light each. Fills points, nodes and seconds of the stats.
-void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
-                 const RayScene& ray_scene, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
+// Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
+// use for it or a layer `wants_depth`. Fills points, nodes and seconds of the stats.
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -23,10 +23,10 @@ Exitance exitance_of(const Body& body, const LitPoints& lit, const Irradiance& l
                      const GatherOptions& options) {
     const PointSet& points = lit.points;
     const std::vector<Rgb>& irradiance = last.values;
-    const PointTree tree(points, irradiance, last.groups, body.profile, body.material->ramp, lit.cells.get(),
-                         last.moments);
+    // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
+    const PointTree tree(points, irradiance, last.groups, body.profile, {}, lit.cells.get(), last.moments);
     Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
-    compensate(body, gains, gathered);
+    compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
     return {std::move(gathered.exitance), std::make_unique<const PointLookup>(points)};

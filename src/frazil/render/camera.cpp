@@ -18,16 +18,30 @@ void check_camera(const Camera& camera) {
             determinant);
 }
 
+namespace {
+
+// The aperture conformed to the image: the side that is too short grows.
+V2f conformed_aperture(const Camera& camera, float aspect) {
+    const float width = camera.horizontal_aperture, height = camera.vertical_aperture;
+    if (width / height < aspect) return {height * aspect, height};
+    return {width, width / aspect};
+}
+
+}  // namespace
+
+bool image_position(const Camera& camera, const V3f& local, float aspect, V2f& image) {
+    if (!(local.z < 0.0f)) return false;
+    const V2f aperture = conformed_aperture(camera, aspect);
+    const float scale = camera.is_orthographic ? 1.0f / camera.aperture_scale : camera.focal_length / -local.z;
+    image.x = 0.5f + (local.x * scale - camera.horizontal_offset) / aperture.x;
+    image.y = 0.5f - (local.y * scale - camera.vertical_offset) / aperture.y;
+    return true;
+}
+
 Ray camera_ray(const Camera& camera, float x, float y, float aspect) {
-    // Conform the aperture to the image: grow the side that is too short.
-    float width = camera.horizontal_aperture, height = camera.vertical_aperture;
-    if (width / height < aspect) {
-        width = height * aspect;
-    } else {
-        height = width / aspect;
-    }
-    const float film_x = (x - 0.5f) * width + camera.horizontal_offset;
-    const float film_y = (0.5f - y) * height + camera.vertical_offset;
+    const V2f aperture = conformed_aperture(camera, aspect);
+    const float film_x = (x - 0.5f) * aperture.x + camera.horizontal_offset;
+    const float film_y = (0.5f - y) * aperture.y + camera.vertical_offset;
 
     V3f origin(0.0f), direction(0.0f, 0.0f, -1.0f);
     if (camera.is_orthographic) {

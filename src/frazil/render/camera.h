@@ -35,6 +35,9 @@ struct PixelCone {
 };
 PixelCone pixel_cone(const Camera& camera, int width, int height);
 
+// Where a place in the camera's frame is in the image, as camera_ray has it; false where it is not in front of the camera.
+bool image_position(const Camera& camera, const V3f& local, float aspect, V2f& image);
+
 // The ray through (x, y) in [0,1]² of the image, (0,0) its upper left corner; `aspect` = width / height of the image in
 // square pixels. The aperture is conformed to the aspect by expanding it (USD's expandAperture).
 Ray camera_ray(const Camera& camera, float x, float y, float aspect);

@@ -37,12 +37,19 @@ struct RenderedCompensation {
     Compensation compensation;
 };
 
+// An overlay that the picture has layers of.
+struct RenderedOverlay {
+    std::string name, material;  // of the layers; the material's path
+    float opacity = 1.0f, age = 0.5f, age_begin = 0.0f, age_end = 1.0f;
+};
+
 struct Film {
     int width = 0, height = 0;
     std::map<std::string, Layer> layers;  // by AOV name
     std::vector<std::string> groups;      // of lights, in the order of the layers; "" for lights without one
     std::vector<RampKnot> knots;          // by number of the layer; empty where the layers were not asked for
     std::vector<RenderedCompensation> compensations;
+    std::vector<RenderedOverlay> overlays;  // empty where the layers were not asked for
 };
 
 }  // namespace frazil

@@ -14,11 +14,13 @@ struct ModeName {
     CompensationMode mode;
     const char* aov;
 };
-constexpr ModeName kModes[] = {{CompensationMode::off, "compensation_off"},
-                               {CompensationMode::ratio, "compensation_ratio"},
-                               {CompensationMode::conserve, "compensation_conserve"},
-                               {CompensationMode::fill, "compensation_fill"},
-                               {CompensationMode::linear, "compensation_linear"}};
+constexpr ModeName kModes[] = {
+    {CompensationMode::off, "compensation_off"},           {CompensationMode::ratio, "compensation_ratio"},
+    {CompensationMode::conserve, "compensation_conserve"}, {CompensationMode::depth, "compensation_depth"},
+    {CompensationMode::fill, "compensation_fill"},         {CompensationMode::linear, "compensation_linear"}};
+
+// Names of planes of ice that is seen by way of another lobe begin like this.
+constexpr const char* kIndirect = "indirect_";
 
 // Does the object emit light that belongs to no light?
 bool emits(const Scene& scene, std::size_t object) {
@@ -63,6 +65,32 @@ void add_knots(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bod
     layout.knots.push_back({"", 0.0f, Rgb(1.0f), Rgb(1.0f), false, true});
 }
 
+void add_overlays(const Scene& scene, FilmLayout& layout) {
+    layout.overlay_of.resize(scene.materials.size());
+    for (const Object& object : scene.objects) {
+        const Material& material = scene.materials[object.material];
+        const auto* ice = std::get_if<IceMaterial>(&material.model);
+        std::vector<std::uint32_t>& own = layout.overlay_of[object.material];
+        if (!ice || !own.empty()) continue;
+        for (std::size_t k = 0; k < ice->overlays.size(); ++k) {
+            const Overlay& overlay = ice->overlays[k];
+            std::string name = overlay.name.empty() ? str(k + 1) : overlay.name;
+            for (char& c : name) {
+                if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+            }
+            // Two of one name in a material are told apart.
+            for (std::size_t j = 0; j < k; ++j) {
+                if (layout.overlay_names[own[j]] == name) name += str("_", k + 1);
+            }
+            const auto found = std::find(layout.overlay_names.begin(), layout.overlay_names.end(), name);
+            own.push_back(static_cast<std::uint32_t>(found - layout.overlay_names.begin()));
+            if (found == layout.overlay_names.end()) layout.overlay_names.push_back(name);
+            layout.overlays.push_back(
+                {name, material.path, overlay.opacity, ice->age, overlay.age_begin, overlay.age_end});
+        }
+    }
+}
+
 // Would the layers of a group of this name be taken for those of a ramp's knots?
 bool is_taken(const std::string& group) {
     if (find_aov("translucency_" + group)) return true;
@@ -83,6 +111,9 @@ void add_lpes(const Scene& scene, std::span<const NamedLpe> lpes, FilmLayout& la
         const bool is_plain = !name.empty() && std::all_of(name.begin(), name.end(),
                                                            [](unsigned char c) { return std::isalnum(c) || c == '_'; });
         if (!is_plain) throw ValueError(str("lpe: name must be of letters, digits and _, got '", name, "'."));
+        if (name.rfind(kIndirect, 0) == 0) {
+            throw ValueError(str("lpe ", name, ": name must not begin with ", kIndirect, ". Choose another."));
+        }
         for (const Aov& aov : aov_table()) {
             if (name == aov.name || name.rfind(str(aov.name, "_"), 0) == 0) {
                 throw ValueError(str("lpe ", name, ": name must not be, or begin like, that of the AOV ", aov.name,
@@ -125,14 +156,22 @@ bool FilmLayout::has(std::string_view aov) const {
     return std::find(aovs.begin(), aovs.end(), aov) != aovs.end();
 }
 
-bool FilmLayout::needs_fill() const {
-    return std::find(modes.begin(), modes.end(), CompensationMode::fill) != modes.end();
+bool FilmLayout::has_mode(CompensationMode mode) const {
+    return std::find(modes.begin(), modes.end(), mode) != modes.end();
 }
 
 std::string FilmLayout::plane_name(std::size_t plane) const {
-    if (plane < knots.size()) return str("translucency_ramp", plane);
+    if (plane >= ice_plane_count()) {
+        const std::size_t own = plane - ice_plane_count(), count = kOverlayPlanes.size();
+        return str("overlay_", overlay_names[own / count], "_", kOverlayPlanes[own % count]);
+    }
+    const bool is_indirect = plane >= seen_plane_count();
+    if (is_indirect) plane -= seen_plane_count();
+    if (plane == seen_plane_count()) return str(kIndirect, "translucency");
+    const std::string prefix = is_indirect ? kIndirect : "";
+    if (plane < knots.size()) return str(prefix, "translucency_ramp", plane);
     for (const ModeName& named : kModes) {
-        if (named.mode == modes[plane - knots.size()]) return named.aov;
+        if (named.mode == modes[plane - knots.size()]) return prefix + named.aov;
     }
     return {};
 }
@@ -176,6 +215,7 @@ FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Bod
     }
     add_ids(scene, layout);
     add_lpes(scene, lpes, layout);
+    if (layout.has("overlay")) add_overlays(scene, layout);
     if (layout.has("translucency_ramp")) add_knots(scene, bodies, layout);
     for (const ModeName& named : kModes) {
         if (layout.has(named.aov)) layout.modes.push_back(named.mode);

@@ -1,9 +1,10 @@
 // Which layers a film gets: decided once per render, read by the paths that fill them and by the film that keeps them.
-// Model: additive light per component and light group always; "planes" of translucency beside it, each per group too:
-//   one per ramp knot and one per compensation mode that was asked for.
+// Model: additive light per component and light group always; "planes" of the light of ice beside it, each per group too:
+//   one per ramp knot and one per compensation mode that was asked for, of ice that is seen and of its light elsewhere.
 // Valid: light groups have names that cannot be taken for another layer's: make_layout refuses the others.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <string>
@@ -38,17 +39,32 @@ struct FilmLayout {
     std::vector<std::string> lpe_names;
     std::vector<LpeAutomaton> lpes;
 
-    // Planes: knots first, then modes.
+    // Planes: knots first, then modes, of translucency; then all of them once more, of the light of ice that is seen by way of
+    // another lobe (diffuse, specular, refraction); and that light as rendered.
     std::vector<RampKnot> knots;
     std::vector<std::size_t> first_knot;  // per material; none where the render has no knot layers
     std::size_t fill_plane = kNone;       // the knot plane of what `fill` adds
     std::vector<CompensationMode> modes;
 
+    // Overlays of the ices in use, by layer: materials' overlays of one name share theirs. Each has the planes of
+    // kOverlayPlanes, after the planes above: the change of components, and for translucency the square's, as an overlay both
+    // tints the light that leaves and takes from what enters.
+    std::vector<RenderedOverlay> overlays;
+    std::vector<std::string> overlay_names;
+    std::vector<std::vector<std::uint32_t>> overlay_of;  // by material and its overlay: of overlay_names
+    enum OverlayPlane { kDiffuse, kTranslucency, kRefraction, kVolume, kSquared };
+    static constexpr std::array kOverlayPlanes = {"diffuse", "translucency", "refraction", "volume", "squared"};
+    std::size_t overlay_plane(std::size_t overlay) const { return ice_plane_count() + overlay * kOverlayPlanes.size(); }
+
     static constexpr std::size_t kNone = ~std::size_t(0);
 
-    std::size_t plane_count() const { return knots.size() + modes.size(); }
+    std::size_t seen_plane_count() const { return knots.size() + modes.size(); }
+    std::size_t ice_plane_count() const { return seen_plane_count() == 0 ? 0 : 2 * seen_plane_count() + 1; }
+    std::size_t plane_count() const { return overlay_plane(overlay_names.size()); }
     bool has(std::string_view aov) const;
-    bool needs_fill() const;  // the light that enters at shading points, for a plane of the compensation `fill`
+    bool has_mode(CompensationMode mode) const;
+    bool needs_fill() const { return has_mode(CompensationMode::fill); }    // light that enters at shading points
+    bool needs_depth() const { return has_mode(CompensationMode::depth); }  // the thickness of bodies
 
     // Layer names: of a component or plane, and of one of its light groups.
     std::string plane_name(std::size_t plane) const;

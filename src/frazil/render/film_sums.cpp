@@ -35,6 +35,7 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     film_.groups = layout.groups;
     film_.knots = layout.knots;
     film_.compensations = layout.compensations;
+    film_.overlays = layout.overlays;
     for (const char* component : kComponentNames) components_.push_back(add_grouped(component));
     for (std::size_t p = 0; p < layout.plane_count(); ++p) planes_.push_back(add_grouped(layout.plane_name(p)));
     for (const std::string& name : layout.lpe_names) lpes_.push_back(add_layer(name, 3));
@@ -43,7 +44,7 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     sample_count_ = utility("sample_count"), variance_ = utility("variance");
     uv_ = utility("uv"), local_position_ = utility("Pref"), material_id_ = utility("material_id");
     instance_id_ = utility("instance_id"), point_spacing_ = utility("point_spacing");
-    lacking_ = utility("compensation_factor");
+    lacking_ = utility("compensation_factor"), motion_ = utility("motion");
     const std::size_t count = std::size_t(width) * height;
     id_slots_.assign(layout.ids.size(), std::vector<float>(count * kIdSlots * 2, 0.0f));
     std::fill(depth_, depth_ + count, std::numeric_limits<float>::infinity());
@@ -119,6 +120,10 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
         if (material_id_) material_id_[film_pixel] = layout_.material_id[object];
         if (instance_id_) instance_id_[film_pixel] = layout_.instance_id[object];
         if (point_spacing_) point_spacing_[film_pixel] = layout_.point_spacing[object];
+    }
+    if (motion_ && (tile.nearest(tile_pixel).depth <= depth_[film_pixel])) {
+        const V2f& motion = tile.nearest(tile_pixel).motion;
+        motion_[2 * film_pixel] = motion.x, motion_[2 * film_pixel + 1] = motion.y;
     }
     if (lacking_) increase(lacking_, film_pixel, tile.lacking(tile_pixel));
     for (std::size_t i = 0; i < lpes_.size(); ++i) increase(lpes_[i], film_pixel, tile.lpe(tile_pixel, i));

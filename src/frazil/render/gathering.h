@@ -1,5 +1,6 @@
 // Answers to the gathers that paths ask for: what ice sends from a place, to the layers of the path that came there.
-// Model: a tile's requests are gathered body by body, compensated, and added to the tile by light group.
+// Model: a tile's requests are gathered body by body, compensated, and added to the tile by light group. What one pixel
+//   asks for at places so near to each other that the exitance is linear between them is gathered once, at their mean.
 // Units: radiance.
 // Valid: thread-safe, one tile a thread; the order of requests decides the order of sums.
 // Not: which gathers are asked for (path_ice.cpp).
@@ -24,8 +25,11 @@ class Gathering {
     void answer(const GatherOptions& options, Tile& tile) const;
 
   private:
-    void add_planes(const GatherRequest& request, const Gathered& gathered, std::size_t row, const Rgb* thin_gain,
-                    Tile& tile) const;
+    void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
+                    std::size_t row, const Rgb* thin_gain, Tile& tile) const;
+
+    void add_overlays(const GatherRequest& request, const Rgb* exitance, const Rgb* taken, std::size_t groups,
+                      const Rgb& gain, const Rgb& fill, Tile& tile) const;
 
     const Scene& scene_;
     const std::vector<std::unique_ptr<Body>>& bodies_;

@@ -184,6 +184,7 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
     }
     Rgb result(1.0f);
     Ray rest = ray;
+    bool is_within = filling(inside) != InsideOf::kNone;  // the ice that the ray begins in
     for (int crossings = 0; crossings < kMostCrossings; ++crossings) {
         Hit hit;
         ++rays;
@@ -204,14 +205,16 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
             if (is_straight && !is_index_matched(ice.material->medium.eta)) *is_straight = false;
             const float cosine = std::abs(surface.normal.dot(rest.direction));
             result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
-            // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
-            const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
-            const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));
-            const float narrowing = cosine / std::max(eta2 * cosine_inside, 1e-4f);
-            if (crossing.to == InsideOf::kNone) {
-                result *= narrowing;
-            } else {
-                result *= ice.material->refraction / std::max(narrowing, 1e-4f);
+            if (crossing.to != InsideOf::kNone) {
+                result *= ice.material->refraction;
+            } else if (is_within) {
+                // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
+                // Light that goes in and out again on a straight line keeps its beam: widening it without bending it
+                // would make energy, most where it leaves at a grazing angle.
+                const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
+                const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));
+                result *= cosine / std::max(eta2 * cosine_inside, 1e-4f);
+                is_within = false;
             }
         }
         inside = crossing.beyond;

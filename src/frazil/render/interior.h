@@ -73,10 +73,11 @@ class Interiors {
     }
     const TransmissionAlbedo& transmission(int body) const { return *transmission_[std::size_t(body)]; }
 
-    // The part of the radiance (over squared index) at the end of the ray that comes straight through ice, without
-    // bending: Fresnel's transmittance and the narrowing of solid angles at boundaries towards the air, scattering and
-    // absorption between, 0 behind anything else. `absorbs` = false leaves absorption out. `rays` counts what is traced; `is_straight` becomes false where a boundary would bend the ray;
-    // overlays are averaged over `footprint`.
+    // The part of the radiance (over squared index where the ray begins in ice) at the end of the ray that comes straight
+    // through ice, without bending: Fresnel's transmittance, scattering and absorption, the narrowing of solid angles
+    // where the ray leaves the ice that it begins in, 0 behind anything else. `absorbs` = false leaves absorption out.
+    // `rays` counts what is traced; `is_straight` becomes false where a boundary would bend the ray; overlays are
+    // averaged over `footprint`.
     Rgb visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs = true,
                    bool* is_straight = nullptr, float footprint = 0.0f) const;
 

@@ -24,6 +24,8 @@ void check_options(const RenderOptions& options) {
     require(std::isfinite(options.spacing) && options.spacing >= 0.0f, "spacing must be >= 0", options.spacing);
     require(std::isfinite(options.spacing_scale) && options.spacing_scale > 0.0f, "spacing_scale must be > 0",
             options.spacing_scale);
+    require(std::isfinite(options.spacing_pixels) && options.spacing_pixels >= 0.0f, "spacing_pixels must be >= 0",
+            options.spacing_pixels);
     require(std::isfinite(options.gather.tolerance) && options.gather.tolerance > 0.0f, "tolerance must be > 0",
             options.gather.tolerance);
 }

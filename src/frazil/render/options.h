@@ -23,8 +23,10 @@ struct RenderOptions {
     int max_bounces = 4;         // of diffuse and specular paths after the first hit
     float spacing = 0.0f;        // of all points, metres; 0 = by material
     float spacing_scale = 1.0f;  // multiplies every spacing
-    int bake_samples = 64;       // shadow rays per point and light; a quarter as many look for bounced light
-    float bake_error = 0.0f;     // relative error at each point to which the bake takes more samples; 0 = none
+    // No finer than so many pixels where a surface is: coarse points far from the camera. 0 = off.
+    float spacing_pixels = 0.0f;
+    int bake_samples = 64;    // shadow rays per point and light; a quarter as many look for bounced light
+    float bake_error = 0.0f;  // relative error at each point to which the bake takes more samples; 0 = none
     // Shadow rays of the bake go on through ice, dimmed. Off: light that enters ice is counted as diffused there, and what
     // also went straight on would be counted twice; on for thin clear ice, whose light that is.
     bool translucent_shadows = false;

@@ -13,7 +13,7 @@ constexpr int kBouncesBeforeRoulette = 3;
 
 PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                        const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-                       const FilmLayout& layout, int max_bounces, const PixelCone& pixel)
+                       const FilmLayout& layout, int max_bounces, const PixelCone& pixel, const MotionVectors* motion)
     : scene_(scene),
       ray_scene_(ray_scene),
       lights_(lights),
@@ -25,7 +25,8 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       single_scattering_(lights, interiors_, bodies),
       camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
       max_bounces_(max_bounces),
-      pixel_(pixel) {}
+      pixel_(pixel),
+      motion_(motion) {}
 
 void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                        Tile& tile) const {
@@ -72,16 +73,21 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             continue;
         }
         add_lights_on_ray(path, is_hit ? &hit : nullptr, tile);
-        if (!is_hit) return;
+        if (!is_hit) {
+            if (view_axis && motion_) tile.add_background(path.pixel, motion_->of_background(path.ray.direction));
+            return;
+        }
 
         const V3f wo = -path.ray.direction;
         path.width += path.spread * length;
-        const Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
+        Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
+        surface.covering.roughness = blurred_roughness(surface.covering.roughness, path.blur);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
-            tile.add_primary(path.pixel, {depth, surface.position, surface.normal, albedo, surface.object + 1,
-                                          surface.st, surface.local_position});
+            tile.add_primary(path.pixel,
+                             {depth, surface.position, surface.normal, albedo, surface.object + 1, surface.st,
+                              surface.local_position, motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
             tile.add_object(path.pixel, surface.object, false);
             view_axis = nullptr;
         };
@@ -106,7 +112,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
 
         // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
-        const Shader shader(surface, body);
+        const Shader shader(surface, body, path.blur);
         if (const float opacity = shader.opacity(); opacity < 1.0f) {
             Sampler coin = path.sampler;
             coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(path.straight));
@@ -125,10 +131,14 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         add_own_light(path, surface, shader, tile);
         float reflection_odds = 1.0f;
         if (body) {
+            if (path.bounce == 0 && !layout_.overlay_names.empty()) {
+                path.overlays = overlay_shares(surface, resolver_.slopes(surface));
+                path.first_material = scene_.objects[surface.object].material;
+            }
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             IceCore core = core_at(surface, static_cast<int>(surface.object));
             core.is_primary = path.bounce == 0;
-            add_entering_light(core, surface, *body, path.sampler);
+            add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {
@@ -180,6 +190,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     Scattering value = shader.eval(wo, wi);
     if (!(value.pdf > 0.0f)) return false;
     value.scale(Rgb(1.0f / (value.pdf * odds)));
+    path.add_blur(luminance(value.diffuse) > luminance(value.specular) ? kDiffuseBlur : shader.alpha());
     path.scatter(value, surface.object);
     path.receive(surface, surface.geometric_normal, LightUse::surface);
     ++path.scattered;

@@ -18,6 +18,7 @@
 #include "frazil/render/film_layout.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/lpe_tracks.h"
+#include "frazil/render/motion.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
 #include "frazil/render/tile.h"
@@ -33,7 +34,8 @@ class PathTracer {
     // Everything must outlive the tracer. `group_of_light` gives each light's index among the light groups.
     PathTracer(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<std::size_t>& group_of_light,
-               const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {});
+               const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
+               const MotionVectors* motion = nullptr);
 
     // Trace one sample. `sampler` stands after the camera's own dimensions.
     void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
@@ -50,6 +52,7 @@ class PathTracer {
                  Tile& tile) const;
     void add_own_light(const Path& path, const Surface& surface, const Shader& shader, Tile& tile) const;
     bool reflect(Path& path, const Surface& surface, const Shader& shader, const V3f& wo, float odds) const;
+    void add_light(const Path& path, Component component, std::size_t group, const Rgb& radiance, Tile& tile) const;
     void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
@@ -68,7 +71,7 @@ class PathTracer {
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
     void request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const;
-    void add_entering_light(IceCore& core, const Surface& surface, const Body& body, Sampler& sampler) const;
+    void add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const;
     // What light path expressions keep.
     void add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance, Tile& tile) const;
     void add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,
@@ -86,6 +89,7 @@ class PathTracer {
     InsideOf camera_inside_;
     int max_bounces_;
     PixelCone pixel_;
+    const MotionVectors* motion_;
 };
 
 }  // namespace frazil

@@ -70,6 +70,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     path.clear = ice.refraction * bare;
     path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
     path.spread += lobe_spread(refraction_alpha(ice, surface));
+    path.add_blur(refraction_alpha(ice, surface));
     path.leave_from(surface.position, -surface.geometric_normal,
                     on_side(frame.to_world(sample.wi), surface.geometric_normal, -1.0f));
     return true;
@@ -154,6 +155,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     }
     const int body = interiors_.filling(path.inside);
     path.spread += lobe_spread(alpha);
+    path.add_blur(alpha);
     if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
     return true;
 }
@@ -181,7 +183,12 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         const auto seen_from = core.is_entered ? track.previous : track.state;
         const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
         if (state == LpeAutomaton::kDead) continue;
-        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share});
+        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
+    }
+    for (const OverlayShare& overlay : path.overlays) {
+        const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
+        const Rgb of_core = core.is_entered ? change_of_core(overlay, share) : overlay.core;
+        request.overlays.push_back({plane, overlay.overlay, overlay.diffuse, of_core, overlay.seen_through});
     }
     tile.requests.push_back(std::move(request));
 }

@@ -5,6 +5,23 @@
 
 namespace frazil {
 
+void PathTracer::add_light(const Path& path, Component component, std::size_t group, const Rgb& radiance,
+                           Tile& tile) const {
+    tile.add(path.pixel, component, group, radiance);
+    for (const OverlayShare& overlay : path.overlays) {
+        const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
+        if (component == Component::diffuse) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kDiffuse, group, radiance * overlay.diffuse);
+        }
+        if (component == Component::refraction) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kRefraction, group, radiance * overlay.seen_through);
+        }
+        if (component == Component::volume) {
+            tile.add_to_plane(path.pixel, plane + FilmLayout::kVolume, group, radiance * overlay.seen_through);
+        }
+    }
+}
+
 void PathTracer::deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group,
                          const Rgb& radiance, Tile& tile) const {
     if (path.bounce == 0) {
@@ -12,7 +29,7 @@ void PathTracer::deliver(const Path& path, Component primary, const Scattering& 
         return;
     }
     const auto add = [&](Component component, const Rgb& weight) {
-        if (weight != Rgb(0.0f)) tile.add(path.pixel, component, group, weight * radiance);
+        if (weight != Rgb(0.0f)) add_light(path, component, group, weight * radiance, tile);
     };
     add(Component::diffuse, weights.diffuse);
     add(Component::specular, weights.specular);
@@ -97,9 +114,9 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     } else {
         weights.scale(path.last.refraction);
     }
-    tile.add(path.pixel, Component::diffuse, group, weights.diffuse * light_over_pdf);
-    tile.add(path.pixel, Component::specular, group, weights.specular * light_over_pdf);
-    tile.add(path.pixel, Component::refraction, group, weights.refraction * light_over_pdf);
+    add_light(path, Component::diffuse, group, weights.diffuse * light_over_pdf, tile);
+    add_light(path, Component::specular, group, weights.specular * light_over_pdf, tile);
+    add_light(path, Component::refraction, group, weights.refraction * light_over_pdf, tile);
     add_lpes_beyond(path, LpeKind::diffuse, surface.object, sample.light, diffuse_lobe * light_over_pdf, tile);
     add_lpes_beyond(path, LpeKind::glossy, surface.object, sample.light, specular_lobe * light_over_pdf, tile);
 }
@@ -151,12 +168,12 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
                     radiance * (value * multiplier(light, LightComponent::refraction)), tile);
 }
 
-void PathTracer::add_entering_light(IceCore& core, const Surface& surface, const Body& body, Sampler& sampler) const {
+void PathTracer::add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const {
     const IceMaterial& ice = *body.material;
-    const bool fills = ice.compensation.mode == CompensationMode::fill;
-    if (!fills && !(core.is_primary && layout_.needs_fill())) return;
-    Sampler copy = sampler;  // a layer that is asked for must not change the picture
-    Sampler& own = fills ? sampler : copy;
+    if (ice.compensation.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+    // Numbers of its own: neither the mode nor a layer that is asked for may change another one.
+    Sampler own = path.sampler;
+    own.set_dimension(kFillDimensions + 4U * path.vertex);
     const float u_pick = own.next_1d();
     const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
     const LightSample sample = lights_.sample(receiver, u_pick, own.next_2d(), LightUse::translucency);

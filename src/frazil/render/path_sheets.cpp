@@ -93,6 +93,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     path.is_glossy = false;
     path.light_share = Rgb(1.0f);
     path.spread += kScatteredSpread;
+    path.add_blur(kDiffuseBlur);
     path.ray = {position, wi};
     IceCore core = path.core;
     core.is_primary = false;

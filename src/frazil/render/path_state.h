@@ -12,21 +12,26 @@
 #include "frazil/lighting/light_sampling.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/lpe_tracks.h"
+#include "frazil/render/overlay_layers.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
 
 namespace frazil {
 
 // Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike; a path that was split
-// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through.
+// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through, and of the
+// light that enters where ice is seen.
 constexpr std::uint32_t kDimensionsPerVertex = 16;
 constexpr std::uint32_t kSplitVertex = 64;
-constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384;
+constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768;
 // Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
 // for what is left.
 constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
 // How much wider an opaque surface makes the cone that a path stands for, per metre.
 constexpr float kScatteredSpread = 0.05f;
+
+// What a diffuse lobe counts for in Path::blur.
+constexpr float kDiffuseBlur = 0.3f;
 
 inline float multiplier(const Light& light, LightComponent component) {
     return light.multipliers[static_cast<int>(component)];
@@ -83,8 +88,12 @@ struct Path {
     IceCore core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
-    float width = 0.0f, spread = 0.0f;  // of the cone that the path stands for: radius at the ray's origin, per metre
-    LpeTracks lpe;                      // of the light path expressions that are asked for
+    // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
+    float blur = 0.0f;
+    float width = 0.0f, spread = 0.0f;   // of the cone that the path stands for: radius at the ray's origin, per metre
+    LpeTracks lpe;                       // of the light path expressions that are asked for
+    std::vector<OverlayShare> overlays;  // where the camera sees ice first, if their layers are asked for
+    std::uint32_t first_material = 0;    // of that ice
 
     // What the last vertex's lobes are worth, weighted by a light's multipliers, by the layer of the first lobe.
     Scattering weights(float diffuse, float specular, float refraction) const {
@@ -107,6 +116,8 @@ struct Path {
         }
         ++bounce;
     }
+
+    void add_blur(float alpha) { blur = std::min(1.0f, std::sqrt(blur * blur + alpha * alpha)); }
 
     void scale(const Rgb& factor) {
         last.scale(factor);

@@ -11,6 +11,8 @@
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
+#include "frazil/render/motion.h"
+#include "frazil/render/overlay_layers.h"
 #include "frazil/render/path.h"
 #include "frazil/render/stopwatch.h"
 
@@ -198,7 +200,6 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
             }
         }
     }
-    tile.gathers += tile.requests.size();
     gathering.answer(options.gather, tile);
 }
 
@@ -210,18 +211,23 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes);
     const std::vector<std::string> groups = light_groups(scene.lights);
+    const auto plant = [&](const std::vector<LitPoints>& lit) {
+        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
+        if (layout.has("overlay")) plant_overlay_trees(SurfaceResolver(scene), lit, groups.size(), bodies);
+    };
     if (baked) {
         check_bake(scene, *baked);
-        plant_trees(scene, baked->bodies, groups.size(), ray_scene, bodies, stats);
+        plant(baked->bodies);
     } else {
-        const Bake fresh = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
-        plant_trees(scene, fresh.bodies, groups.size(), ray_scene, bodies, stats);
+        plant(make_bake(scene, ray_scene, bodies, options, {}, stats, progress).bodies);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
     const std::vector<std::size_t> group_of_light = groups_of(scene.lights, layout.groups);
+    const MotionVectors motion(scene, options.width, options.height);
     const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces,
-                            pixel_cone(scene.camera, options.width, options.height));
+                            pixel_cone(scene.camera, options.width, options.height),
+                            layout.has("motion") ? &motion : nullptr);
     const Gathering gathering(scene, bodies, layout);
     for (const std::string& warning : tracer.warnings()) stats.warnings.push_back(warning);
     const FilterSampler filter(options.filter);

@@ -29,7 +29,8 @@ void check_material(const Material& material) {
     require(ice->compensation.limit >= 1.0f, "compensation_limit must be >= 1", ice->compensation.limit);
     require(ice->compensation.strength >= 0.0f && ice->compensation.strength <= 1.0f,
             "compensation_strength must be in 0..1", ice->compensation.strength);
-    require(ice->spacing >= 0.0f && std::isfinite(ice->spacing), "spacing must be >= 0", ice->spacing);
+    require(ice->spacing.value >= 0.0f && std::isfinite(ice->spacing.value), "spacing must be >= 0",
+            ice->spacing.value);
 }
 
 }  // namespace

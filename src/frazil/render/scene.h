@@ -1,9 +1,10 @@
 // The whole scene, as plain data: what a USD stage (or Python) fills in and every stage reads.
 // Model: meshes and materials are shared by index; objects place them. Nested instances arrive flattened.
 // Units: metres, radiance; right-handed, any up axis (the reader turns it to +y).
-// Not: time. A scene is one frame.
+// Not: time. A scene is one frame; where it goes from there is told for motion vectors alone.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -29,6 +30,14 @@ struct Object {
     std::string asset;  // what it belongs to, for Cryptomatte; empty = the object itself
 };
 
+// How a scene goes on: its objects' transforms, the vertices of its meshes (empty where they stay) and its camera a frame
+// later.
+struct SceneMotion {
+    std::vector<M44f> local_to_world;
+    std::vector<std::vector<V3f>> positions;
+    Camera camera;
+};
+
 struct Scene {
     std::vector<Mesh> meshes;
     std::vector<std::string> mesh_paths;  // for messages, one per mesh
@@ -36,6 +45,7 @@ struct Scene {
     std::vector<Object> objects;
     std::vector<Light> lights;
     Camera camera;
+    std::optional<SceneMotion> motion;
 };
 
 // Check everything once before a render: ValueError with the path of the first thing that is wrong.

@@ -4,7 +4,7 @@
 
 namespace frazil {
 
-Shader::Shader(const Surface& surface, const Body* body)
+Shader::Shader(const Surface& surface, const Body* body, float blur)
     : geometric_normal_(surface.geometric_normal), normal_(surface.normal), body_(body) {
     std::tie(tangent_, bitangent_) = tangent_frame(normal_);
     if (body_) {
@@ -18,7 +18,7 @@ Shader::Shader(const Surface& surface, const Body* body)
                        (body_->material->translucency * (1.0f - covering.scattered));
     } else {
         const auto& material = std::get<StandardMaterial>(surface.material->model);
-        standard_.emplace(material, surface.st, surface.display_color);
+        standard_.emplace(material, surface.st, surface.display_color, blur);
     }
 }
 

@@ -26,13 +26,16 @@ struct Scattering {
 // The scattering of one surface, directions in world space.
 class Shader {
   public:
-    // `body` is the surface's translucent body, null for other materials.
-    Shader(const Surface& surface, const Body* body);
+    // `body` is the surface's translucent body, null for other materials; `blur` broadens their glossy lobes (that of ice
+    // is the surface's covering's).
+    Shader(const Surface& surface, const Body* body, float blur = 0.0f);
 
     // The fraction of light that the surface stops: 1 but for cut-out standard materials.
     float opacity() const { return standard_ ? standard_->opacity() : 1.0f; }
     // Whether what is seen in the reflection has edges, so that light through ice must be bent in it.
-    bool is_glossy() const { return (standard_ ? standard_->alpha() : alpha_) < kGlossyAlpha; }
+    bool is_glossy() const { return alpha() < kGlossyAlpha; }
+    // Of the glossy lobe.
+    float alpha() const { return standard_ ? standard_->alpha() : alpha_; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
     // The share of light from all around that goes towards wo, all lobes together.

@@ -59,6 +59,14 @@ M44f rigid_part(const M44f& matrix) {
     return m;
 }
 
+Covering covering_at(const IceMaterial& ice, const PatternPoint& place, const V2f& st, bool with_bump) {
+    const float roughness = eval_float(ice.roughness, st);
+    if (!ice.overlays.empty()) return eval_overlays(ice.overlays, ice.age, roughness, place, st, with_bump);
+    Covering bare;
+    bare.roughness = roughness;
+    return bare;
+}
+
 }  // namespace
 
 SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
@@ -69,26 +77,37 @@ SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
     }
 }
 
-Covering SurfaceResolver::covering(const IceMaterial& ice, std::uint32_t object, const V3f& position, const V3f& normal,
-                                   const V2f& st, float footprint, bool with_bump) const {
-    const float roughness = eval_float(ice.roughness, st);
-    if (ice.overlays.empty()) {
-        Covering bare;
-        bare.roughness = roughness;
-        return bare;
-    }
+PatternPoint SurfaceResolver::place(std::uint32_t object, const V3f& position, const V3f& normal,
+                                    float footprint) const {
     PatternPoint point;
     point.position = position * world_to_rest(object);
     world_to_rest(object).multDirMatrix(normal, point.normal);
     point.footprint = footprint;
-    return eval_overlays(ice.overlays, ice.age, roughness, point, st, with_bump);
+    return point;
 }
 
-std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSet& points) const {
-    const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
-    if (!ice || ice->overlays.empty()) return {};
+std::vector<CoveringSlope> SurfaceResolver::slopes(const Surface& surface) const {
+    const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
+    return ice ? covering_slopes(ice->overlays, ice->age, surface.place, surface.st) : std::vector<CoveringSlope>();
+}
+
+std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, const PointSet& points) const {
+    const auto& ice = std::get<IceMaterial>(scene_.materials[scene_.objects[object].material].model);
+    const std::size_t overlays = ice.overlays.size();
+    std::vector<float> result(points.size() * overlays);
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const V2f& st) {
+        const std::vector<CoveringSlope> slopes = covering_slopes(ice.overlays, ice.age, at, st);
+        const float scattered = eval_overlays(ice.overlays, ice.age, 0.0f, at, st, false).scattered;
+        for (std::size_t o = 0; o < overlays; ++o) {
+            result[k * overlays + o] = scattered < 1.0f ? slopes[o].scattered / (1.0f - scattered) : 0.0f;
+        }
+    });
+    return result;
+}
+
+template <class Visit>
+void SurfaceResolver::for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const {
     const Mesh& mesh = scene_.meshes[scene_.objects[object].mesh];
-    std::vector<float> result(points.size());
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto triangle = static_cast<std::uint32_t>(points.triangles[k]);
@@ -96,9 +115,17 @@ std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSe
                 mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, triangle, points.barycentrics[k]);
             // A point stands for a disc of its area.
             const float footprint = std::sqrt(points.areas[k] * kInvPi);
-            result[k] =
-                1.0f - covering(*ice, object, points.positions[k], points.normals[k], st, footprint, false).scattered;
+            visit(k, place(object, points.positions[k], points.normals[k], footprint), st);
         }
+    });
+}
+
+std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSet& points) const {
+    const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
+    if (!ice || ice->overlays.empty()) return {};
+    std::vector<float> result(points.size());
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const V2f& st) {
+        result[k] = 1.0f - eval_overlays(ice->overlays, ice->age, 0.0f, at, st, false).scattered;
     });
     return result;
 }
@@ -112,9 +139,12 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
 
     // The place from barycentrics: as exact as the vertices, unlike origin + t * direction.
     const V3i& triangle = mesh.triangles[hit.triangle];
-    const V3f local = mesh.positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) +
-                      mesh.positions[triangle.y] * hit.uv.x + mesh.positions[triangle.z] * hit.uv.y;
-    surface.local_position = local;
+    const auto at_hit = [&](const std::vector<V3f>& positions) {
+        return positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) + positions[triangle.y] * hit.uv.x +
+               positions[triangle.z] * hit.uv.y;
+    };
+    const V3f local = at_hit(mesh.positions);
+    surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest);
     surface.position = local * object.local_to_world;
 
     const V3f wo = -direction;
@@ -137,7 +167,8 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     if (const auto* ice = std::get_if<IceMaterial>(&surface.material->model)) {
         // Patterns see the surface from outside, whichever side the viewer is on.
         const V3f outside = surface.normal * (hit.geometric_normal.dot(surface.geometric_normal) < 0.0f ? -1.0f : 1.0f);
-        surface.covering = covering(*ice, hit.placement, surface.position, outside, surface.st, footprint, with_bump);
+        surface.place = place(hit.placement, surface.position, outside, footprint);
+        surface.covering = covering_at(*ice, surface.place, surface.st, with_bump);
         if (surface.covering.slope != V3f(0.0f)) {
             V3f slope;
             rest_to_world(hit.placement).multDirMatrix(surface.covering.slope, slope);

@@ -21,9 +21,10 @@ struct Surface {
     V3f geometric_normal = V3f(0.0f);  // unit length, on the viewer's side
     V3f normal = V3f(0.0f);            // for shading, unit length, the viewer above it
     V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
-    V3f local_position = V3f(0.0f);    // in the mesh's own space
+    V3f local_position = V3f(0.0f);    // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
-    Covering covering;  // of ice: its overlays, with the roughness that they leave
+    Covering covering;   // of ice: its overlays, with the roughness that they leave
+    PatternPoint place;  // where those read their patterns
 };
 
 // Resolves hits into surfaces; holds what that needs per object.
@@ -38,6 +39,11 @@ class SurfaceResolver {
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
     std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
 
+    // How the covering of a surface of ice changes with each overlay's opacity.
+    std::vector<CoveringSlope> slopes(const Surface& surface) const;
+    // Which part of the light that enters each point an overlay takes, more by the logarithm of its opacity: (N, overlays).
+    std::vector<float> taken_by_overlays(std::uint32_t object, const PointSet& points) const;
+
     // World space to the object's rest space and back: rigid, perhaps mirrored.
     const M44f& world_to_rest(std::uint32_t object) const { return frames_[object].world_to_rest; }
     const M44f& rest_to_world(std::uint32_t object) const { return frames_[object].rest_to_world; }
@@ -46,8 +52,9 @@ class SurfaceResolver {
     struct Frames {
         M44f world_to_local, world_to_rest, rest_to_world;
     };
-    Covering covering(const IceMaterial& ice, std::uint32_t object, const V3f& position, const V3f& normal,
-                      const V2f& st, float footprint, bool with_bump) const;
+    PatternPoint place(std::uint32_t object, const V3f& position, const V3f& normal, float footprint) const;
+    template <class Visit>
+    void for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const;
 
     const Scene& scene_;
     std::vector<Frames> frames_;

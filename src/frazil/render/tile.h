@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -34,6 +35,7 @@ struct PrimaryHit {
     std::uint32_t object_id = 0;
     V2f st = V2f(0.0f);
     V3f local_position = V3f(0.0f);
+    V2f motion = V2f(0.0f);  // of the background where nothing is hit
 };
 
 // Exitance wanted at a place on ice, and what becomes of it.
@@ -55,6 +57,13 @@ struct GatherRequest {
         Rgb weight = Rgb(0.0f);
     };
     std::vector<Lpe> lpes;
+    // Of the overlays where the path began: their plane, and the change of its light through diffuse reflection, from the
+    // core and through the surface; which overlay of the body's material it is, where the camera sees the body itself.
+    struct Overlay {
+        std::size_t plane = 0, own = 0;
+        Rgb diffuse = Rgb(0.0f), core = Rgb(0.0f), seen_through = Rgb(0.0f);
+    };
+    std::vector<Overlay> overlays;
 };
 
 class Tile {
@@ -103,6 +112,11 @@ class Tile {
         albedo_[pixel] += hit.albedo;
         ++hits_[pixel];
         if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
+    }
+
+    // Where a sample shows nothing.
+    void add_background(std::size_t pixel, const V2f& motion) {
+        if (std::isinf(nearest_[pixel].depth)) nearest_[pixel].motion = motion;
     }
 
     void add_coverage(std::size_t pixel, const Rgb& coverage, const Rgb& lacking) {

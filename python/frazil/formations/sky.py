@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from noise import Noise, swirl
+from .noise import Noise, swirl
 
 kZenith = np.array([0.10, 0.22, 0.46])
 kHorizon = np.array([0.80, 0.92, 1.04])

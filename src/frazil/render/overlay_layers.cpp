@@ -1,0 +1,58 @@
+#include "frazil/render/overlay_layers.h"
+
+#include <algorithm>
+
+namespace frazil {
+namespace {
+
+// Below this nothing is left that a change could be relative to.
+constexpr float kNothing = 1e-4f;
+
+Rgb over(const Rgb& change, const Rgb& value) {
+    Rgb result(0.0f);
+    for (int c = 0; c < 3; ++c) result[c] = value[c] > 0.0f ? change[c] / value[c] : 0.0f;
+    return result;
+}
+
+}  // namespace
+
+std::vector<OverlayShare> overlay_shares(const Surface& surface, const std::vector<CoveringSlope>& slopes) {
+    const Covering& covering = surface.covering;
+    const float bare = std::max(kNothing, 1.0f - covering.covered),
+                entering = std::max(kNothing, 1.0f - covering.scattered);
+    std::vector<OverlayShare> shares;
+    // Those that are not here count too: light to the points around here is theirs.
+    for (std::uint32_t k = 0; k < slopes.size(); ++k) {
+        const CoveringSlope& slope = slopes[k];
+        const float seen_through = -slope.covered / bare;
+        shares.push_back({k, over(slope.reflectance, covering.reflectance), over(slope.tint, covering.tint),
+                          Rgb(seen_through), seen_through + slope.scattered / entering});
+    }
+    return shares;
+}
+
+Rgb change_of_core(const OverlayShare& overlay, const Rgb& share) {
+    return overlay.core - over((Rgb(1.0f) - share) * overlay.clearness, share);
+}
+
+void plant_overlay_trees(const SurfaceResolver& resolver, const std::vector<LitPoints>& lit, std::size_t groups,
+                         std::vector<std::unique_ptr<Body>>& bodies) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i] || lit[i].points.size() == 0 || bodies[i]->material->overlays.empty()) continue;
+        const std::size_t overlays = bodies[i]->material->overlays.size(), count = lit[i].points.size();
+        const std::vector<float> taken = resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points);
+        std::vector<Rgb> light(count * overlays * groups);
+        for (std::size_t n = 0; n < count; ++n) {
+            for (std::size_t k = 0; k < overlays; ++k) {
+                for (std::size_t g = 0; g < groups; ++g) {
+                    light[(n * overlays + k) * groups + g] =
+                        lit[i].irradiance[n * groups + g] * -taken[n * overlays + k];
+                }
+            }
+        }
+        bodies[i]->overlay_tree = std::make_unique<const PointTree>(lit[i].points, light, overlays * groups,
+                                                                    bodies[i]->profile, bodies[i]->material->ramp);
+    }
+}
+
+}  // namespace frazil
