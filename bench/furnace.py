@@ -1,4 +1,4 @@
-"""White furnace: ice that absorbs nothing under even light of radiance 1 must look 1 everywhere, with every compensation.
+"""White furnace: ice that absorbs nothing under even light of radiance 1 must look 1 everywhere.
 
     python bench/furnace.py MESH.ply [--bounces 8] [--samples 64] [--spacing S]
 
@@ -45,10 +45,8 @@ def main() -> None:
         bounces = options.bounces if mode in ("conserve", "depth") else 0  # others make energy with each
         values = furnace(mesh, mode, bounces, options.samples, options.spacing)
         close = 100 * np.mean(np.abs(values - 1) <= 0.02)
-        print(
-            f"| {mode}, {bounces} bounces | {values.min():.3f} | {values.mean():.3f} | {values.max():.3f} | {close:.1f} % |",
-            flush=True,
-        )
+        numbers = " | ".join(f"{v:.3f}" for v in (values.min(), values.mean(), values.max()))
+        print(f"| {mode}, {bounces} bounces | {numbers} | {close:.1f} % |", flush=True)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 
 For every scene: a cloud of 20 N points with the plain sum is the truth, the plain sum over N points the bar, and each
 candidate has N/10 points. Errors are relative RMS over what a camera sees; flicker is the RMS change, over the mean of
-both, between two seeds of the points. Light is a sun with ray-traced shadows over a weak sky; on the plane it is a step.
+both, between two seeds of the points. Light is a sun with ray-traced shadows over a weak sky; a step on the plane.
 
     python bench/noise_free.py [MESH ...] [--points 20000 100000] [--profile MultipleScattering]
 
 Without meshes: the plane alone. `sum`: light at the points. `disc`: the kernel averaged over a disc of each point's
-area. `disc, mean`: the same with light averaged over the cell. `cell, point`: the kernel averaged over the cell, light at
-the points. `cell, mean`: both over the cell, without its centre of light. `cell`: with it, as renders do. A star marks
-sums divided by W/Rd_total.
+area. `disc, mean`: the same with light averaged over the cell. `cell, point`: the kernel averaged over the cell, light
+at the points. `cell, mean`: both over the cell, without its centre of light. `cell`: with it, as renders do. A star
+marks sums divided by W/Rd_total.
 """
 
 from __future__ import annotations
@@ -120,28 +120,22 @@ def main() -> None:
     parser.add_argument("meshes", type=Path, nargs="*")
     parser.add_argument("--points", type=int, nargs="+", default=[20_000])
     parser.add_argument("--profile", default="MultipleScattering")
-    parser.add_argument(
-        "--scattering", type=float, default=30.0, help="of the medium, 1/m, for a body of 1 m (default 30)"
-    )
+    parser.add_argument("--scattering", type=float, default=30.0, help="1/m, for a body of 1 m (default 30)")
     options = parser.parse_args()
-    medium = fz.Medium(
-        sigma_s_prime=options.scattering, sigma_a=np.array([0.6, 0.15, 0.05]) * options.scattering / 30, eta=1.31
-    )
+    scattering = options.scattering
+    medium = fz.Medium(scattering, np.array([0.6, 0.15, 0.05]) * scattering / 30, eta=1.31)
     profile = getattr(fz, options.profile)(medium)
-    print(
-        "| scene | N | points | spacing, mean free paths | error % | error % * | flicker % |\n|---|---|---|---|---|---|---|"
-    )
+    columns = ("scene", "N", "points", "spacing, mean free paths", "error %", "error % *", "flicker %")
+    print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     scenes = [(path.stem, read(path)) for path in options.meshes] or [("plane", plane())]
     for name, mesh in scenes:
         setting = Setting(name, mesh)
         for count in options.points:
-            for kind, (error, evened, flicker) in measure(setting, profile, count).items():
+            for kind, found in measure(setting, profile, count).items():
                 n = count if kind == "bar" else count // 10
                 spacing = np.sqrt(0.7 * setting.area / n) / float(medium.mean_free_path.min())
-                print(
-                    f"| {setting.name} | {count} | {n} {kind} | {spacing:.2f} | {error:.2f} | {evened:.2f} | {flicker:.2f} |",
-                    flush=True,
-                )
+                numbers = " | ".join(f"{value:.2f}" for value in (spacing, *found))
+                print(f"| {name} | {count} | {n} {kind} | {numbers} |", flush=True)
 
 
 if __name__ == "__main__":

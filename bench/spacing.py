@@ -1,9 +1,9 @@
-"""Two figures that defaults rest on: the error of a point's spacing, and what cutting large footprints does to coverage.
+"""Two figures that defaults rest on: the error of a spacing, and what cutting large footprints does to coverage.
 
     python bench/spacing.py MESH [--bake-samples 256]
 
-Renders a body of 30 mean free paths with plain and noise-free sums at spacings of 1, 0.5 and 0.25 mean free paths against
-one of 0.125 (relative RMS of its translucency); and gathers the coverage of a plane at spacings of 1 to 4.
+Renders a body of 30 mean free paths with plain and noise-free sums at spacings of 1, 0.5 and 0.25 mean free paths
+against one of 0.125 (relative RMS of its translucency); and gathers the coverage of a plane at spacings of 1 to 4.
 """
 
 import argparse
@@ -40,10 +40,8 @@ def main() -> None:
     truth = translucency(mesh, 0.125 * length, "noise_free", options.bake_samples)
     print("| spacing, mean free paths | sum, error % | noise_free, error % |\n|---|---|---|")
     for spacing in (1.0, 0.5, 0.25):
-        errors = [
-            rms(translucency(mesh, spacing * length, kind, options.bake_samples), truth)
-            for kind in ("sum", "noise_free")
-        ]
+        kinds = ("sum", "noise_free")
+        errors = [rms(translucency(mesh, spacing * length, kind, options.bake_samples), truth) for kind in kinds]
         print(f"| {spacing} | {errors[0]:.2f} | {errors[1]:.2f} |", flush=True)
 
     profile = fz.MultipleScattering(fz.Medium(30.0, (0.6, 0.15, 0.05), eta=1.31))

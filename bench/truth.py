@@ -77,10 +77,8 @@ def main() -> None:
     truth, inside = reference["radiance"], reference["coverage"] == 1
     height, width = inside.shape
     noise = np.sqrt(np.mean(reference["stderr"][inside] ** 2, axis=0) / np.mean(truth[inside] ** 2, axis=0))
-    print(
-        f"{args.reference.stem}: {inside.sum()} pixels compared; the reference's own noise, which is in the errors, is"
-    )
-    print(" ".join(f"{100 * value:.1f}" for value in noise) + " %")
+    own = " ".join(f"{100 * value:.1f}" for value in noise)
+    print(f"{args.reference.stem}: {inside.sum()} pixels; noise of the reference itself, in all errors: {own} %")
     print(
         "| compensation | bounces | RMS R G B, % | truth / render R G B | points | seconds |\n|---|---|---|---|---|---|"
     )

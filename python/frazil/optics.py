@@ -2,10 +2,11 @@
 
 Absorption tables are per metre from 350 to 750 nm in steps of 10 nm:
 
-- ``warren2008``: 4 pi k / wavelength from the imaginary index k of [WarrenBrandt2008] at these wavelengths, within 0.3 %
-  of the table in the package snowoptics 0.99.2.
+- ``warren2008``: 4 pi k / wavelength from the imaginary index k of [WarrenBrandt2008] at these wavelengths, within
+  0.3 % of the table in the package snowoptics 0.99.2.
 - ``picard2016``: [Picard2016] below 600 nm as the authors' package snowoptics 0.99.2 holds it, within 0.5 % (its values
-  lie 6-7 % under the table on the authors' page), and [WarrenBrandt2008] above. In the blue it absorbs ten times as much.
+  lie 6-7 % under the table on the authors' page), and [WarrenBrandt2008] above. In the blue it absorbs ten times as
+  much.
 
 Checked against that package: both tables, soot and dust. From memory: the efficiency and asymmetry of bubbles, algae.
 
@@ -46,9 +47,9 @@ _IMPURITIES = {
     "soot": (7500.0, 550.0, 1.0),  # [BondBergstrom2006]
     "dust": (110.0, 400.0, 4.1),  # Sahara (Libya), PM2.5 [Caponi2017]
 }
-# Absorption of algae per mass of chlorophyll a in m²/kg: lobes (value, peak and width in nm) of the blue and the red band of
-# chlorophyll and of the pigments between, over a floor. The two peaks are those of [Bricaud1995] at 1 mg/m³, from memory;
-# widths, shoulder and floor are ours.
+# Absorption of algae per mass of chlorophyll a in m²/kg: lobes (value, peak and width in nm) of the blue and the red
+# band of chlorophyll and of the pigments between, over a floor. The two peaks are those of [Bricaud1995] at 1 mg/m³,
+# from memory; widths, shoulder and floor are ours.
 _ALGAE_LOBES = ((3.6e4, 437.0, 28.0), (1.8e4, 485.0, 30.0), (1.8e4, 675.0, 11.0))
 _ALGAE_FLOOR = 2.5e3
 IMPURITIES = (*_IMPURITIES, "algae")
@@ -210,9 +211,8 @@ def media() -> dict[str, Medium]:
 
 def media_lines() -> list[str]:
     """The table that ``frazil info --media`` prints: every medium with its units."""
-    lines = [
-        "medium              sigma_s_prime (1/m)          sigma_a (1/m)                eta   albedo            what"
-    ]
+    columns = ("medium", "sigma_s_prime (1/m)", "sigma_a (1/m)", "eta", "albedo R G B", "what")
+    lines = ["{:<19} {:<28} {:<28} {:<5} {:<17} {}".format(*columns)]
 
     def row(name: str, medium: Medium, meaning: str) -> str:
         scatter, absorb = (" ".join(f"{v:<8.3g}" for v in values) for values in (medium.sigma_s_prime, medium.sigma_a))

@@ -46,9 +46,8 @@ def test_cells_are_the_mesh(shape):
     assert len(cells) == len(points)
     assert cells.areas.sum() == pytest.approx(shape.area, rel=1e-5)
     areas, centroids = cells.areas.astype(float)[:, None], cells.centroids.astype(float)
-    np.testing.assert_allclose(
-        (areas * centroids).sum(0) / shape.area, shape.triangles_center.T @ shape.area_faces / shape.area, atol=1e-6
-    )
+    middle = shape.triangles_center.T @ shape.area_faces / shape.area
+    np.testing.assert_allclose((areas * centroids).sum(0) / shape.area, middle, atol=1e-6)
     second = areas * (cells.covariances[:, :3] + centroids**2)
     corners = shape.triangles.astype(float)
     true = shape.area_faces @ ((corners**2).sum(1) + 9 * corners.mean(1) ** 2) / 12
@@ -62,9 +61,12 @@ def test_places_lie_on_the_mesh_in_their_cells():
     shape = blob(4)
     mesh = to_mesh(shape)
     points = fz.poisson_points(mesh, 0.04)
-    cells = fz.Cells(points, mesh, places=512)
+    cells = fz.Cells(points, mesh, places=31)
     assert (np.diff(cells.owners.astype(int)) >= 0).all()
-    np.testing.assert_allclose(np.bincount(cells.owners, cells.weights, len(points)), cells.areas, rtol=1e-4)
+    whole = np.bincount(cells.owners, minlength=len(points)) < 31
+    assert whole.mean() > 0.9
+    held = np.bincount(cells.owners, cells.weights, len(points))
+    np.testing.assert_allclose(held[whole], cells.areas[whole], rtol=1e-4)
     assert np.linalg.norm(cells.positions - points.positions[cells.owners], axis=1).max() < 1.5 * points.spacing
     assert (np.abs(np.linalg.norm(cells.normals, axis=1) - 1) < 1e-5).all()
     away = trimesh.proximity.closest_point_naive(shape, cells.positions[::500])[1]
@@ -124,7 +126,7 @@ def test_ramp_layers_with_cells():
 
 
 def test_a_render_takes_a_tenth_of_the_points():
-    """Renders bake over cells: sparse noise-free points are nearer to dense ones than plain points of ten times as many."""
+    """Renders bake over cells: sparse noise-free points are nearer to dense ones than ten times as many plain ones."""
     shape = blob(4)
     scene = fz.Scene()
     mesh = scene.add_mesh(to_mesh(shape), "/blob")
@@ -148,30 +150,16 @@ def test_a_render_takes_a_tenth_of_the_points():
     assert rms(sparse[inside], truth[inside]) <= rms(plain[inside], truth[inside])
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda p, m: fz.Cells(p, m, places=0), r"Cells: places must be in \[1, 4096\], got 0"),
-        (lambda p, m: fz.Cells(fz.PointSet(), m), None),
-        (lambda p, m: fz.Cells(p, fz.Mesh(m.positions + np.float32(5), m.triangles)), "Cells: points must cover the mesh"),
-        (
-            lambda p, m: fz.PointTree(fz.poisson_points(m, 0.3), np.ones((3, 3)), fz.Dipole(fz.Medium(1, 1)), cells=fz.Cells(p, m)),
-            "PointTree: irradiance must have one row per point",
-        ),
-        (
-            lambda p, m: fz.PointTree(
-                fz.poisson_points(m, 0.3), np.ones((len(fz.poisson_points(m, 0.3)), 3)), fz.Dipole(fz.Medium(1, 1)),
-                cells=fz.Cells(p, m),
-            ),
-            "PointTree: cells must be one per point",
-        ),
-    ],
-)  # fmt: skip
-def test_bad_input(make, message):
-    mesh = plane()
-    points = fz.poisson_points(mesh, 0.1)
-    if message is None:
-        assert len(make(points, mesh)) == 0
-        return
-    with pytest.raises(ValueError, match=message):
-        make(points, mesh)
+def test_bad_input():
+    mesh, profile = plane(), fz.Dipole(fz.Medium(1, 1))
+    points, fewer = fz.poisson_points(mesh, 0.1), fz.poisson_points(mesh, 0.3)
+    assert len(fz.Cells(fz.PointSet(), mesh)) == 0
+    with pytest.raises(ValueError, match=r"Cells: places must be in \[1, 4096\], got 0"):
+        fz.Cells(points, mesh, places=0)
+    with pytest.raises(ValueError, match="Cells: points must cover the mesh within their spacing"):
+        fz.Cells(points, fz.Mesh(mesh.positions + np.float32(5), mesh.triangles))
+    cells = fz.Cells(points, mesh)
+    with pytest.raises(ValueError, match="PointTree: irradiance must have one row per point"):
+        fz.PointTree(points, np.ones((3, 3)), profile, cells=cells)
+    with pytest.raises(ValueError, match="PointTree: cells must be one per point"):
+        fz.PointTree(fewer, np.ones((len(fewer), 3)), profile, cells=cells)

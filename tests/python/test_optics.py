@@ -34,7 +34,7 @@ def test_bubbles_and_impurities_add_up():
 
 
 def test_the_two_tables_are_those_of_the_papers_everywhere():
-    """Decades of the blue minimum: W&B flat near 6.5e-4/m below 400 nm, Picard never under 0.015/m; both rise to red."""
+    """Decades of the blue minimum: Warren's below 8e-4/m, Picard's never under 0.015/m; both rise to red."""
     warren, picard = optics.absorption("warren2008"), optics.absorption("picard2016")
     assert warren[:6].max() < 8e-4
     assert picard.min() > 0.015

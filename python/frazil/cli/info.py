@@ -20,9 +20,7 @@ def info_command(
     file: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="A USD stage, an EXR, or points (PLY).", show_default=False)
     ] = None,
-    media: Annotated[
-        bool, typer.Option("--media", help="List the media of frazil.optics instead, with units.")
-    ] = False,
+    media: Annotated[bool, typer.Option("--media", help="List the media of frazil.optics, with units.")] = False,
 ) -> None:
     """Say what is in a USD stage, an EXR, or a file of points; or list the media that are built in."""
     if media == (file is not None):
