@@ -21,7 +21,7 @@ export CMAKE_CXX_COMPILER_LAUNCHER ?= ccache
 endif
 
 CORE_SOURCES   := $(shell find src -name '*.cpp' -o -name '*.h')
-PYTHON_SOURCES := $(shell find python -name '*.py' -o -name '*.pyi' -o -name 'py.typed')
+PYTHON_SOURCES := $(shell find python -name '*.py' -o -name '*.pyi' -o -name 'py.typed' -o -name '*.mtlx')
 # Folders, so that a file that was removed is seen too.
 SOURCE_FOLDERS := $(shell find src python -type d -not -name __pycache__)
 CPP_TESTS      := $(shell find tests/cpp -name '*.cpp' -o -name '*.h') tests/cpp

@@ -131,6 +131,18 @@ def subdivide(cage: ControlMesh, level: int, path: str = 'ControlMesh') -> tuple
     The Catmull-Clark limit surface, `level` quads along each edge: (Mesh, the face of each triangle).
     """
 
+def cut_long_edges(mesh: Mesh, edge_length: float, most_triangles: int = 4000000) -> tuple[Mesh, NDArray[numpy.int32], float]:
+    """
+    Halve edges until none is longer than edge_length: (Mesh, the triangle that each was cut from (F,) int32, the
+    longest edge that is left). No more than most_triangles are made.
+    """
+
+def displaced(mesh: Mesh, offsets: numpy.typing.ArrayLike) -> Mesh:
+    """
+    Move the vertices by offsets (3F, 3) at the corners of the triangles, their mean at each vertex, and give the
+    shape its normals. No cracks open.
+    """
+
 class PointSet:
     """
     Points on a mesh that stand for its surface. The arrays are views of the set's own memory.
@@ -925,6 +937,27 @@ def measure_bake(points: object, scene: RayScene, lights: Sequence[Light], sampl
     (rays, seconds) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
     """
 
+class TextureTile:
+    """
+    One image of a Texture.
+
+    Parameters
+    ----------
+    number : UDIM, 1001 and on; 0 = the image of all st.
+    texels : (height, width, channels) float32, linear, 1 to 4 channels, row 0 on top.
+    load : function without arguments that gives the same texels again. With it only copies of at most `kept` texels
+        on a side are kept now, and finer ones when they are first seen; it may be called from any thread.
+    is_half : keep them as half floats.
+    """
+
+    def __init__(self, number: int, texels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], load: Callable | None = None, kept: int = 64, is_half: bool = False, content: str = '') -> None: ...
+
+    @property
+    def number(self) -> int: ...
+
+    def memory(self) -> int:
+        """Bytes that are kept now."""
+
 class Texture:
     """
     An image on a surface.
@@ -937,8 +970,27 @@ class Texture:
 
     def __init__(self, texels: Annotated[NDArray[numpy.float32], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrap_s: str = 'repeat', wrap_t: str = 'repeat') -> None: ...
 
+    @staticmethod
+    def from_tiles(tiles: Sequence[TextureTile], wrap_s: str = 'repeat', wrap_t: str = 'repeat', missing: Sequence[float] = [0.0, 0.0, 0.0, 1.0]) -> Texture:
+        """
+        A texture of TextureTiles by ascending number; `missing` is its value where there is none.
+        """
+
     @property
-    def texels(self) -> NDArray[numpy.float32]: ...
+    def texels(self) -> numpy.ndarray | None:
+        """
+        Of the first tile; None where it is read from its file as it is needed.
+        """
+
+    @property
+    def tiles(self) -> list[int]: ...
+
+    @property
+    def content(self) -> str:
+        """Tells the content of images that are read as they are needed."""
+
+    def memory(self) -> int:
+        """Bytes that are kept now."""
 
     @property
     def wrap_s(self) -> str: ...
@@ -957,9 +1009,12 @@ class TextureLookup:
     ----------
     texture : Texture, shared, not copied.
     first_channel : 0..3; a scalar input reads this channel, a colour three from it on.
+    is_grey : a colour reads that one channel three times.
+    is_triplanar : project along the axes of rest space even where there are texture
+        coordinates; triplanar_size : metres of one repeat where it is projected.
     """
 
-    def __init__(self, texture: Texture, first_channel: int = 0, scale: Sequence[float] = [1.0, 1.0, 1.0], bias: Sequence[float] = [0.0, 0.0, 0.0], st_scale: Sequence[float] = [1.0, 1.0], st_rotation: float = 0.0, st_translation: Sequence[float] = [0.0, 0.0]) -> None: ...
+    def __init__(self, texture: Texture, first_channel: int = 0, scale: Sequence[float] = [1.0, 1.0, 1.0], bias: Sequence[float] = [0.0, 0.0, 0.0], st_scale: Sequence[float] = [1.0, 1.0], st_rotation: float = 0.0, st_translation: Sequence[float] = [0.0, 0.0], is_grey: bool = False, is_triplanar: bool = False, triplanar_size: float = 1.0) -> None: ...
 
     @property
     def texture(self) -> Texture: ...
@@ -982,15 +1037,25 @@ class TextureLookup:
     @property
     def st_rotation(self) -> float: ...
 
+    @property
+    def is_grey(self) -> bool: ...
+
+    @property
+    def is_triplanar(self) -> bool: ...
+
+    @property
+    def triplanar_size(self) -> float: ...
+
     def __repr__(self) -> str: ...
 
 class StandardMaterial:
     """
     UsdPreviewSurface. Inputs take a constant or a TextureLookup; the names and
-    defaults are the specification's, in snake_case.
+    defaults are the specification's, in snake_case. bump: height in metres, a
+    TextureLookup.
     """
 
-    def __init__(self, *, diffuse_color: TextureLookup | Sequence[float] = ..., uses_display_color: bool = False, emissive_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], use_specular_workflow: bool = False, specular_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], metallic: TextureLookup | float = 0.0, roughness: TextureLookup | float = 0.5, clearcoat: TextureLookup | float = 0.0, clearcoat_roughness: TextureLookup | float = 0.009999999776482582, opacity: TextureLookup | float = 1.0, opacity_threshold: float = 0.0, ior: float = 1.5, normal: TextureLookup | None = None) -> None: ...
+    def __init__(self, *, diffuse_color: TextureLookup | Sequence[float] = ..., uses_display_color: bool = False, emissive_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], use_specular_workflow: bool = False, specular_color: TextureLookup | Sequence[float] = [0.0, 0.0, 0.0], metallic: TextureLookup | float = 0.0, roughness: TextureLookup | float = 0.5, clearcoat: TextureLookup | float = 0.0, clearcoat_roughness: TextureLookup | float = 0.009999999776482582, opacity: TextureLookup | float = 1.0, opacity_threshold: float = 0.0, ior: float = 1.5, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def diffuse_color(self) -> TextureLookup | list[float]: ...
@@ -1041,6 +1106,18 @@ class StandardMaterial:
     def opacity(self, arg: TextureLookup | float, /) -> None: ...
 
     @property
+    def bump(self) -> TextureLookup | float: ...
+
+    @bump.setter
+    def bump(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def normal(self) -> TextureLookup | None: ...
+
+    @normal.setter
+    def normal(self, value: TextureLookup | None) -> None: ...
+
+    @property
     def uses_display_color(self) -> bool: ...
 
     @uses_display_color.setter
@@ -1063,9 +1140,6 @@ class StandardMaterial:
 
     @ior.setter
     def ior(self, arg: float, /) -> None: ...
-
-    @property
-    def normal(self) -> TextureLookup | None: ...
 
     def __repr__(self) -> str: ...
 
@@ -1237,11 +1311,13 @@ class IceMaterial:
     compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;
         compensation_strength in [0, 1].
     spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's vertices.
+    normal : tangent-space normal map, a TextureLookup (usually scale 2, bias -1), or None.
+    bump : height in metres, a TextureLookup.
 
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -1254,6 +1330,18 @@ class IceMaterial:
 
     @tint.setter
     def tint(self, arg: TextureLookup | Sequence[float], /) -> None: ...
+
+    @property
+    def bump(self) -> TextureLookup | float: ...
+
+    @bump.setter
+    def bump(self, arg: TextureLookup | float, /) -> None: ...
+
+    @property
+    def normal(self) -> TextureLookup | None: ...
+
+    @normal.setter
+    def normal(self, value: TextureLookup | None) -> None: ...
 
     @property
     def spacing(self) -> TextureLookup | float: ...
@@ -1355,6 +1443,32 @@ class IceMaterial:
     def compensation_strength(self, arg: float, /) -> None: ...
 
     def __repr__(self) -> str: ...
+
+class Displacement:
+    """
+    What moves a surface before points and rays meet it. Lengths in the mesh's own units.
+
+    Parameters
+    ----------
+    height : along the normal; a constant or a TextureLookup.
+    vector : takes the place of height; a TextureLookup or a constant, in `space` 'tangent' (along s, along t,
+        normal) or 'object'.
+    pattern : an Overlay, whose pattern (not its opacity or mask) multiplies either; metres.
+    """
+
+    def __init__(self, *, height: TextureLookup | float = 0.0, vector: TextureLookup | Sequence[float] | None = None, space: str = 'tangent', pattern: Overlay | None = None) -> None: ...
+
+    @property
+    def height(self) -> TextureLookup | float: ...
+
+    @property
+    def vector(self) -> TextureLookup | list[float] | None: ...
+
+    @property
+    def space(self) -> str: ...
+
+    def eval(self, mesh: Mesh, metres_per_unit: float = 1.0) -> Annotated[NDArray[numpy.float32], dict(shape=(None, None))]:
+        """Offsets (3F, 3) at the corners of a mesh, for displaced()."""
 
 class Camera:
     """

@@ -73,6 +73,13 @@ def test_places_lie_on_the_mesh_in_their_cells():
     assert away.max() < 1e-5
 
 
+def test_points_that_a_stretched_mesh_carries_still_have_all_of_it():
+    mesh = plane()
+    stretched = fz.Mesh(mesh.positions * np.float32([3, 1, 1]), mesh.triangles)
+    points = fz.poisson_points(mesh, 0.05).on(stretched)
+    assert fz.Cells(points, stretched).areas.sum() == pytest.approx(3.0, rel=1e-4)
+
+
 def test_few_places_stand_for_all_without_bias():
     """Of a mesh much finer than its cells, four places of each: the weights' sum over many seeds is the area."""
     mesh = to_mesh(blob(5))

@@ -319,14 +319,14 @@ def test_display_color_without_a_material_and_through_a_reader(stage):
 
 
 def test_unknown_shaders_become_their_nearest_match(stage):
-    shader = bind(stage, add_quad(stage, "/Quad"), "ND_standard_surface_surfaceshader", context="mtlx")
+    shader = bind(stage, add_quad(stage, "/Quad"), "acme:paint", context="acme")
     shader.CreateInput("base_color", COLOR).Set(Gf.Vec3f(0.7, 0.6, 0.5))
     shader.CreateInput("specular_roughness", FLOAT).Set(0.25)
     model, scene = read_model(stage)
     np.testing.assert_allclose(model.diffuse_color, [0.7, 0.6, 0.5], rtol=1e-6)
     assert model.roughness == pytest.approx(0.25)
     assert len(scene.warnings) == 1
-    assert scene.warnings[0].startswith("/Material/Surface: the shader 'ND_standard_surface_surfaceshader'")
+    assert scene.warnings[0].startswith("/Material/Surface: the shader 'acme:paint'")
 
 
 def test_a_binding_to_nothing_is_named(stage):

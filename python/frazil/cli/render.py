@@ -30,6 +30,11 @@ def render_command(
     camera: Annotated[
         str | None, typer.Option(metavar="PATH", help="Prim path of the camera. Default: the stage's own, else a view.")
     ] = None,
+    materials: Annotated[
+        Path | None,
+        typer.Option(metavar="LOOKS.mtlx", help="A MaterialX file whose look replaces the stage's materials."),
+    ] = None,
+    look: Annotated[str | None, typer.Option(metavar="NAME", help="Of --materials; by default its first.")] = None,
     resolution: Annotated[
         str | None,
         typer.Option(metavar="WxH", help="Pixels. Default: the stage's render settings, else 960x540."),
@@ -190,7 +195,9 @@ def render_command(
     with make_progress("none" if quiet and progress == "bar" else progress, len(jobs)) as reporter:
         for time_code, exr, preview in jobs:
             start = time.perf_counter()
-            loaded = load_usd(scene, frame=time_code, camera=camera, rest_frame=rest_frame)
+            loaded = load_usd(
+                scene, frame=time_code, camera=camera, rest_frame=rest_frame, materials=materials, look=look
+            )
             seconds_load = time.perf_counter() - start
             reporter("load", 1.0)
 

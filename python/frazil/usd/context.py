@@ -27,6 +27,7 @@ class ReadContext:
     rest_time: Usd.TimeCode | None = None  # of meshes whose points move and that have no rest primvar
     warnings: list[str] = field(default_factory=list)
     temporary_files: dict[str, Path] = field(default_factory=dict)
+    layers: list[Sdf.Layer] = field(default_factory=list)  # made here, and kept alive
     _said: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom
 
 from .._frazil import ControlMesh, Mesh, subdivide, triangulate
 from .context import ReadContext
+from .displacement import SurfaceDisplacement, displace
 from .primvars import Primvar, read_display_color, read_normals, read_rest, read_spacing, read_texcoords
 
 # Above this many triangles a cage is refined less, so that dense scans stay what they are.
@@ -23,8 +24,16 @@ class MeshPart:
     subset: str = ""
 
 
-def read_mesh(context: ReadContext, prim: Usd.Prim, texcoord_name: str | None) -> list[MeshPart]:
+def read_mesh(
+    context: ReadContext,
+    prim: Usd.Prim,
+    texcoord_name: str | None,
+    displacements: dict[str, SurfaceDisplacement] | None = None,
+    metres_per_unit: float = 1.0,
+) -> list[MeshPart]:
     """The prim's mesh at the frame, in its own frame and units, cut by material subsets.
+
+    `displacements` are those of the prim's own material ('') and of its subsets; `metres_per_unit` is of its frame.
 
     ValueError, beginning with the prim's path, where it is broken; an empty list (after a warning) where it has no
     faces.
@@ -62,7 +71,13 @@ def read_mesh(context: ReadContext, prim: Usd.Prim, texcoord_name: str | None) -
         context.warn(path, "has no faces that can be seen. It is left out.")
         return []
     _set_point_data(context, schema, mesh, len(points), lambda values: _refined_like(values, cage_of, level, mesh))
-    return _split_by_subsets(context, schema, mesh, faces, len(counts))
+    subsets = material_subsets(prim)
+    owner = _owners(context, subsets, len(counts))
+    names = ["", *(subset.GetPrim().GetName() for subset in subsets)]
+    if displacements:
+        numbered = {names.index(name) - 1: surface for name, surface in displacements.items() if name in names}
+        mesh, faces = displace(context, path, mesh, faces, owner, numbered, metres_per_unit)
+    return _split_by_owner(mesh, owner[faces], names)
 
 
 def _refined(cage: ControlMesh, level: int | None, path: str) -> tuple[Mesh, np.ndarray]:
@@ -155,12 +170,8 @@ def _creases(context: ReadContext, schema: UsdGeom.Mesh) -> dict:
     }
 
 
-def _split_by_subsets(
-    context: ReadContext, schema: UsdGeom.Mesh, mesh: Mesh, faces: np.ndarray, face_count: int
-) -> list[MeshPart]:
-    subsets = material_subsets(schema.GetPrim())
-    if not subsets:
-        return [MeshPart(mesh)]
+def _owners(context: ReadContext, subsets: list[UsdGeom.Subset], face_count: int) -> np.ndarray:
+    """The number of the subset that each face belongs to; -1 for none."""
     owner = np.full(face_count, -1, dtype=np.int32)
     for number, subset in enumerate(subsets):
         indices = _array(context, subset.GetIndicesAttr(), np.int64)
@@ -172,11 +183,14 @@ def _split_by_subsets(
             )
             indices = indices[is_valid]
         owner[indices] = number
-    owner_of_triangle = owner[faces]
+    return owner
+
+
+def _split_by_owner(mesh: Mesh, owner: np.ndarray, names: list[str]) -> list[MeshPart]:
     parts = []
-    for number, name in [(-1, "")] + [(i, s.GetPrim().GetName()) for i, s in enumerate(subsets)]:
-        triangles = np.flatnonzero(owner_of_triangle == number).astype(np.int32)
-        if len(triangles) == len(faces):
+    for number, name in enumerate(names, -1):
+        triangles = np.flatnonzero(owner == number).astype(np.int32)
+        if len(triangles) == len(owner):
             return [MeshPart(mesh, name)]
         if len(triangles):
             parts.append(MeshPart(mesh.submesh(triangles), name))

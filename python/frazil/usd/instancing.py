@@ -9,6 +9,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from .._frazil import Scene
 from .context import ReadContext, are_singular, to_array
+from .displacement import SurfaceDisplacement, displace
 from .geometry import MeshPart, material_subsets, read_mesh
 from .gprims import read_gprim
 from .lights import LightReader, is_light
@@ -33,7 +34,7 @@ class StageWalker:
         self._materials = MaterialReader(context, scene)
         self._links = LinkReader(context)
         self._lights = LightReader(context, scene, self._links)
-        self._meshes: dict[tuple[str, str | None], list[tuple[int, str]]] = {}
+        self._meshes: dict[tuple, list[tuple[int, str]]] = {}
 
     def walk(self) -> None:
         """Add every leaf of the stage."""
@@ -113,7 +114,9 @@ class StageWalker:
             for subset in material_subsets(prim):
                 materials[subset.GetPrim().GetName()] = self._materials.bound_to(subset.GetPrim())
         texcoord_name = next((m.texcoord_name for m in materials.values() if m.texcoord_name), None)
-        parts = self._mesh_parts(prim, texcoord_name)
+        displacements = {key: m.displacement for key, m in materials.items() if m.displacement is not None}
+        metres_per_unit = abs(np.linalg.det(matrices[0][:3, :3])) ** (1 / 3) if len(matrices) else 1.0
+        parts = self._mesh_parts(prim, texcoord_name, displacements, metres_per_unit)
         if not parts:
             return
         asset = _asset_of(prim)
@@ -130,16 +133,32 @@ class StageWalker:
                 if is_light(prim):
                     self._lights.read_mesh(prim, matrix, name, index)
 
-    def _mesh_parts(self, prim: Usd.Prim, texcoord_name: str | None) -> list[tuple[int, str]]:
-        """Indices of the prim's meshes in the scene and the subsets that they belong to; read on first use."""
+    def _mesh_parts(
+        self,
+        prim: Usd.Prim,
+        texcoord_name: str | None,
+        displacements: dict[str, SurfaceDisplacement],
+        metres_per_unit: float,
+    ) -> list[tuple[int, str]]:
+        """Indices of the prim's meshes in the scene and the subsets that they belong to; read on first use.
+
+        Displaced meshes of one prototype are shared too: heights are those of its first place.
+        """
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = (str(source.GetPath()), texcoord_name)
+        moved = tuple(sorted((name, surface.path) for name, surface in displacements.items()))
+        key = (str(source.GetPath()), texcoord_name, moved)
         if key not in self._meshes:
             self._meshes[key] = []  # stays so where reading fails, so that it is tried once
             if prim.IsA(UsdGeom.Mesh):
-                parts = read_mesh(self._context, prim, texcoord_name)
+                parts = read_mesh(self._context, prim, texcoord_name, displacements, metres_per_unit)
             else:
-                parts = [MeshPart(read_gprim(self._context, prim))]
+                mesh = read_gprim(self._context, prim)
+                if displacements and metres_per_unit > 0.0:
+                    owner = np.full(len(mesh.triangles), -1, np.int32)
+                    faces = np.arange(len(owner), dtype=np.int32)
+                    of_owner = {-1: displacements[""]} if "" in displacements else {}
+                    mesh, _ = displace(self._context, prim.GetPath(), mesh, faces, owner, of_owner, metres_per_unit)
+                parts = [MeshPart(mesh)]
             self._meshes[key] = [(self._scene.add_mesh(p.mesh, str(prim.GetPath())), p.subset) for p in parts]
         return self._meshes[key]
 

@@ -6,7 +6,7 @@ import numpy as np
 from pxr import Sdf, Usd
 
 from .context import ReadContext
-from .textures import decode_srgb, is_srgb, read_image, resolve
+from .textures import read_image, resolve, to_linear
 
 
 def read_light_image(
@@ -24,8 +24,10 @@ def read_light_image(
         return None
     color_space = (attribute.GetColorSpace() or "auto") if attribute else "auto"
     pixels = pixels[..., :3] if pixels.shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
-    if is_srgb(color_space, is_8_bit, 3):
-        pixels = decode_srgb(pixels)
+    try:
+        pixels = to_linear(pixels, str(color_space), is_8_bit)
+    except ValueError as error:
+        context.warn(path, f"{error} {file} is taken as raw.")
     is_good = np.isfinite(pixels)
     if not is_good.all():
         context.warn(path, f"{file} has {int((~is_good).sum())} NaN or infinite values. They are taken as 0.")

@@ -1,4 +1,4 @@
-"""The one table of material inputs: reading, defaults, ranges and docs/usd.md are driven by it."""
+"""The one table of material inputs: reading, defaults, ranges, the MaterialX library and the docs are driven by it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class MaterialInput:
     """
 
     name: str
-    kind: str  # float, int, color, vector, bool, token, floats, colors
+    kind: str  # float, int, color, vector, bool, token, floats, colors, normal (a map alone)
     default: object
     minimum: float = 0.0
     maximum: float = INFINITY
@@ -102,6 +102,10 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("preset_scale", "float", 1.0, 1e-6, meaning="how much larger the preset's lengths are"),
     MaterialInput("age", "float", 0.5, 0.0, 1.0, meaning="0 = fresh .. 1 = old: brings out the overlays"),
     MaterialInput("tint", "color", (1.0, 1.0, 1.0), takes_texture=True, meaning="multiplies what leaves the core"),
+    MaterialInput("normal", "normal", None, takes_texture=True, meaning="tangent-space normal map"),
+    MaterialInput(
+        "bump", "float", 0.0, -INFINITY, length_power=1, takes_texture=True, meaning="height; tilts the normal alone"
+    ),
     MaterialInput(
         "ramp_distances", "floats", (), length_power=1, meaning="knots of the colour ramp, strictly increasing"
     ),
@@ -131,6 +135,11 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
         takes_texture=True,
         meaning="of the points; 0 = from the mean free path; a texture is read at the mesh's vertices",
     ),
+)
+
+# What describes a pattern alone.
+_PATTERN_INPUTS = frozenset(
+    {"pattern", "size", "width", "feather", "warp", "scales", "amount", "slope", "direction", "seed"}
 )
 
 # frazil:overlay, a shader whose output is connected to an input `overlays:NAME` of frazil:ice.
@@ -196,10 +205,37 @@ PREVIEW_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("opacity", "float", 1.0, 0.0, 1.0, takes_texture=True),
     MaterialInput("opacityThreshold", "float", 0.0, 0.0, 1.0),
     MaterialInput("ior", "float", 1.5, 1.0, 100.0),
+    MaterialInput("normal", "normal", None, takes_texture=True),
 )
 
 # Inputs that UsdPreviewSurface has and Frazil does not: silent, as they change nothing that is rendered here.
-PREVIEW_IGNORED = frozenset({"displacement", "occlusion", "normal", "opacityMode"})
+PREVIEW_IGNORED = frozenset({"displacement", "occlusion", "opacityMode"})
+
+
+# frazil:displacement, a shader whose output is connected to a material's outputs:displacement.
+DISPLACEMENT_INPUTS: tuple[MaterialInput, ...] = (
+    MaterialInput("height", "float", 0.0, -INFINITY, length_power=1, takes_texture=True, meaning="along the normal"),
+    MaterialInput(
+        "vector",
+        "vector",
+        None,
+        -INFINITY,
+        length_power=1,
+        takes_texture=True,
+        meaning="takes the place of the height",
+    ),
+    MaterialInput(
+        "space",
+        "token",
+        "tangent",
+        choices=("tangent", "object"),
+        meaning="of the vector: along s, along t and the normal; or the mesh's own",
+    ),
+    MaterialInput(
+        "edge_length", "float", 0.0, length_power=1, meaning="of the finest triangles; 0 = what image and pattern show"
+    ),
+    *(row for row in OVERLAY_INPUTS if row.name in _PATTERN_INPUTS),
+)
 
 
 def find_input(table: tuple[MaterialInput, ...], name: str) -> MaterialInput | None:
@@ -219,9 +255,9 @@ def snake_case(name: str) -> str:
 
 
 def inputs_markdown(table: tuple[MaterialInput, ...] = ICE_INPUTS) -> str:
-    """A table of inputs as the docs show it: frazil:ice in docs/usd.md, frazil:overlay in docs/material.md."""
+    """A table of inputs as the docs show it: frazil:ice in docs/usd.md, the others in docs/material.md."""
     lines = ["| input | type | default | range | unit | meaning |", "|---|---|---|---|---|---|"]
-    types = {"color": "color3f", "vector": "vector3f", "floats": "float[]", "colors": "color3f[]"}
+    types = {"color": "color3f", "vector": "vector3f", "floats": "float[]", "colors": "color3f[]", "normal": "normal3f"}
     for row in table:
         default = "–" if row.default is None or row.default == () else str(row.default)
         unit = {1: "scene unit", -1: "1/scene unit", 0: ""}[row.length_power]

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from pxr import Tf, Usd, UsdShade
 
-from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial, TextureLookup
+from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial
 from ..ice import find_preset, preset_medium, preset_overlays
 from .context import ReadContext
-from .material_inputs import (
-    ICE_INPUTS,
-    OVERLAY_INPUTS,
-    PREVIEW_IGNORED,
-    PREVIEW_INPUTS,
-    MaterialInput,
-    find_input,
-    nearest_name,
-    snake_case,
-)
-from .shading import ShaderReader, Source
+from .displacement import SurfaceDisplacement, read_displacement
+from .expression import Expression
+from .material_inputs import ICE_INPUTS, OVERLAY_INPUTS, PREVIEW_IGNORED, PREVIEW_INPUTS, find_input, snake_case
+from .material_values import ShaderValues, texcoord_name, to_value
+from .mtlx_library import ICE_NODE, OVERLAY_NODE, OVERLAY_SLOTS
+from .shading import ShaderReader
+from .surface_models import MODELS, SurfaceModelReader
 
-ICE_SHADER = "frazil:ice"
-OVERLAY_SHADER = "frazil:overlay"
+ICE_SHADERS = ("frazil:ice", ICE_NODE)
+OVERLAY_SHADERS = ("frazil:overlay", OVERLAY_NODE)
+PREVIEW_SHADERS = ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader")
+# The surface of the first of these that the material has is read.
+RENDER_CONTEXTS = ("frazil", "mtlx", "")
 _OVERLAY_PREFIX = "overlays:"
 
 # Inputs of shaders that Frazil does not know, and the input of UsdPreviewSurface that they come nearest to.
@@ -52,10 +50,11 @@ _NEAREST_INPUTS = {
 
 @dataclass(frozen=True)
 class BoundMaterial:
-    """A material of the scene, and the primvar that its textures are looked up by (None = no texture)."""
+    """A material of the scene, the primvar that its textures are looked up by (None = no texture), and displacement."""
 
     index: int
     texcoord_name: str | None = None
+    displacement: SurfaceDisplacement | None = None
 
 
 class MaterialReader:
@@ -72,22 +71,27 @@ class MaterialReader:
         material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("full")
         if not material:
             self._warn_of_broken_binding(prim)
-            return self._add("", lambda: (StandardMaterial(uses_display_color=True), None))
+            return self._add("", None, lambda: (StandardMaterial(uses_display_color=True), None))
         path = str(material.GetPath())
         if material.GetPrim().IsInstanceProxy():
             path = str(material.GetPrim().GetPrimInPrototype().GetPath())
-        return self._add(path, lambda: self._read(material))
+        return self._add(path, material, lambda: self._read(material))
 
-    def _add(self, path: str, read) -> BoundMaterial:
+    def _add(self, path: str, material: UsdShade.Material | None, read) -> BoundMaterial:
         if path not in self._known:
+            displacement = None
             try:
-                model, texcoord_name = read()
+                model, primvar = read()
+                if material is not None:
+                    displacement = read_displacement(self._shaders, material, RENDER_CONTEXTS)
             except (ValueError, TypeError, Tf.ErrorException) as error:
                 # A broken material must not lose the meshes that it is bound to.
                 self._context.warn(path, f"{' '.join(str(error).split())} displayColor is shown.")
-                model, texcoord_name = StandardMaterial(uses_display_color=True), None
+                model, primvar = StandardMaterial(uses_display_color=True), None
             index = self._scene.add_material(path or "displayColor", model)
-            self._known[path] = BoundMaterial(index, texcoord_name)
+            if primvar is None and displacement is not None:
+                primvar = displacement.texcoord_name
+            self._known[path] = BoundMaterial(index, primvar, displacement)
         return self._known[path]
 
     def _warn_of_broken_binding(self, prim: Usd.Prim) -> None:
@@ -99,29 +103,36 @@ class MaterialReader:
             )
 
     def _read(self, material: UsdShade.Material):
-        shader, _, _ = material.ComputeSurfaceSource("frazil")  # or the universal one
-        if not shader:
+        found = []
+        for render_context in RENDER_CONTEXTS:
+            shader, _, _ = material.ComputeSurfaceSource(render_context)  # of this context, else the universal one
+            if shader:
+                found.append(shader)
+        if not found:
             return self._read_nearest(material, None)
+        known = (*ICE_SHADERS, *PREVIEW_SHADERS, *MODELS)
+        shader = next((s for s in found if s.GetShaderId() in known), found[0])
         kind = shader.GetShaderId()
-        if kind == ICE_SHADER:
+        if kind in ICE_SHADERS:
             return self._read_ice(shader)
-        if kind == "UsdPreviewSurface":
+        if kind in PREVIEW_SHADERS:
             return self._read_preview(shader)
+        if kind in MODELS:
+            return SurfaceModelReader(self._shaders, shader).read()
         return self._read_nearest(material, shader)
 
     # -- frazil:ice
 
     def _read_ice(self, shader: UsdShade.Shader):
         path = shader.GetPath()
-        self._warn_of_unknown_inputs(shader, ICE_INPUTS, frozenset(), _OVERLAY_PREFIX)
-        sources = {row.name: self._shaders.read(shader, row.name) for row in ICE_INPUTS}
-        values = {row.name: self._to_value(shader, row, sources[row.name]) for row in ICE_INPUTS}
+        read = ShaderValues(self._shaders, shader, ICE_INPUTS, frozenset(OVERLAY_SLOTS), (_OVERLAY_PREFIX,))
+        values = read.values
         name, scale = values.pop("preset"), values.pop("preset_scale")
         preset = find_preset(name) if name != "none" else None
         if preset is not None:
-            values |= {key: value for key, value in preset.inputs.items() if sources[key] is None}
+            values |= {key: value for key, value in preset.inputs.items() if key not in read.authored}
 
-        medium = self._read_medium(path, sources, values, preset, scale)
+        medium = self._read_medium(path, read.authored, values, preset, scale)
         overlays = preset_overlays(preset, scale, direction=self._up()) if preset is not None else []
         authored, masks = self._read_overlays(shader)
         values["ramp_distances"], values["ramp_colors"] = self._check_ramp(
@@ -133,11 +144,11 @@ class MaterialReader:
             overlays=overlays + authored,
             **{key: value for key, value in values.items() if key not in in_medium},
         )
-        return model, _texcoord_name(self._context, path, sources | masks)
+        return model, texcoord_name(self._context, path, [*read.expressions.values(), *masks])
 
-    def _read_medium(self, path, sources, values, preset, scale: float) -> Medium:
-        has_sigma = sources["sigma_s_prime"] is not None or sources["sigma_a"] is not None
-        has_albedo = sources["albedo"] is not None or sources["mean_free_path"] is not None
+    def _read_medium(self, path, authored: set[str], values, preset, scale: float) -> Medium:
+        has_sigma = bool(authored & {"sigma_s_prime", "sigma_a"})
+        has_albedo = bool(authored & {"albedo", "mean_free_path"})
         if has_sigma and has_albedo:
             self._context.warn(
                 path, "has both albedo or mean_free_path and sigma_s_prime or sigma_a. The sigmas are used."
@@ -159,26 +170,25 @@ class MaterialReader:
         """The stage's up axis, in its own frame: patterns are read in the frames of its meshes."""
         return (0.0, 0.0, 1.0) if self._context.is_z_up else (0.0, 1.0, 0.0)
 
-    def _read_overlays(self, ice: UsdShade.Shader) -> tuple[list[Overlay], dict[str, Source | None]]:
-        """The overlays that are connected, in the order of their inputs' names, and their texture masks."""
+    def _read_overlays(self, ice: UsdShade.Shader) -> tuple[list[Overlay], list[Expression]]:
+        """The overlays that are connected, in the order of their inputs' names, and what feeds their masks."""
         overlays: list[Overlay] = []
-        masks: dict[str, Source | None] = {}
+        masks: list[Expression] = []
         connected = sorted(
-            (i for i in ice.GetInputs() if i.GetBaseName().startswith(_OVERLAY_PREFIX)), key=lambda i: i.GetBaseName()
+            name
+            for name in (i.GetBaseName() for i in ice.GetInputs())
+            if name.startswith(_OVERLAY_PREFIX) or name in OVERLAY_SLOTS
         )
-        for overlay_input in connected:
-            attributes = overlay_input.GetValueProducingAttributes()
-            shader = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
-            if not shader or shader.GetShaderId() != OVERLAY_SHADER:
+        for name in connected:
+            shader = self._shaders.shader_of(ice, name)
+            if shader is None or shader.GetShaderId() not in OVERLAY_SHADERS:
                 self._context.warn(
-                    ice.GetPath(),
-                    f"{overlay_input.GetBaseName()} must be connected to a {OVERLAY_SHADER}. It is left out.",
+                    ice.GetPath(), f"{name} must be connected to a {OVERLAY_SHADERS[0]}. It is left out."
                 )
                 continue
-            self._warn_of_unknown_inputs(shader, OVERLAY_INPUTS, frozenset())
-            sources = {row.name: self._shaders.read(shader, row.name) for row in OVERLAY_INPUTS}
-            values = {row.name: self._to_value(shader, row, sources[row.name]) for row in OVERLAY_INPUTS}
-            if sources["direction"] is None:
+            read = ShaderValues(self._shaders, shader, OVERLAY_INPUTS)
+            values = read.values
+            if "direction" not in read.authored:
                 values["direction"] = self._up()
             if values["age_end"] < values["age_begin"]:
                 self._context.warn(
@@ -187,9 +197,9 @@ class MaterialReader:
                     f"{values['age_begin']:g} is used.",
                 )
                 values["age_end"] = values["age_begin"]
-            name = overlay_input.GetBaseName().removeprefix(_OVERLAY_PREFIX)
-            overlays.append(Overlay(**values, name=name))
-            masks[str(shader.GetPath())] = sources["mask"]
+            overlays.append(Overlay(**values, name=name.removeprefix(_OVERLAY_PREFIX)))
+            if "mask" in read.expressions:
+                masks.append(read.expressions["mask"])
         return overlays, masks
 
     def _check_ramp(self, path, distances, colors):
@@ -208,28 +218,16 @@ class MaterialReader:
     # -- UsdPreviewSurface
 
     def _read_preview(self, shader: UsdShade.Shader):
-        self._warn_of_unknown_inputs(shader, PREVIEW_INPUTS, PREVIEW_IGNORED)
-        sources = {row.name: self._shaders.read(shader, row.name) for row in PREVIEW_INPUTS}
-        normal = self._shaders.read(shader, "normal")
-        displacement = self._shaders.read(shader, "displacement")
-        if displacement is not None and (displacement.lookup is not None or displacement.value):
-            self._context.warn(shader.GetPath(), "displacement is not supported. The surface is rendered as it is.")
-        return self._standard(shader, sources, normal)
+        read = ShaderValues(self._shaders, shader, PREVIEW_INPUTS, PREVIEW_IGNORED)
+        return self._standard(shader, read.values, read.expressions)
 
-    def _standard(self, shader: UsdShade.Shader, sources: dict[str, Source | None], normal: Source | None):
-        values = {}
-        for row in PREVIEW_INPUTS:
-            source = sources.get(row.name)
-            if source is not None and source.is_display_color:
-                continue
-            values[snake_case(row.name)] = self._to_value(shader, row, source)
-        diffuse = sources.get("diffuseColor")
+    def _standard(self, shader: UsdShade.Shader, values: dict[str, object], expressions: dict[str, Expression]):
+        diffuse = expressions.get("diffuseColor")
         model = StandardMaterial(
             uses_display_color=diffuse is not None and diffuse.is_display_color,
-            normal=normal.lookup if normal is not None else None,
-            **values,
+            **{snake_case(name): value for name, value in values.items()},
         )
-        return model, _texcoord_name(self._context, shader.GetPath(), {**sources, "normal": normal})
+        return model, texcoord_name(self._context, shader.GetPath(), list(expressions.values()))
 
     # -- anything else
 
@@ -241,114 +239,22 @@ class MaterialReader:
             context.warn(material.GetPath(), "has no surface shader. displayColor is shown.")
             return StandardMaterial(uses_display_color=True), None
         kind = shader.GetShaderId() or shader.GetPrim().GetTypeName() or "?"
-        sources: dict[str, Source | None] = {}
-        for name, candidates in _NEAREST_INPUTS.items():
-            found = next((c for c in candidates if shader.GetInput(c)), None)
-            if found:
-                sources[name] = self._shaders.read(shader, found)
         context.warn(
             shader.GetPath(),
             f"the shader '{kind}' is not supported. Its nearest match in UsdPreviewSurface is rendered.",
             once="shader",
         )
-        if sources.get("diffuseColor") is None:
+        values: dict[str, object] = {}
+        expressions: dict[str, Expression] = {}
+        for name, candidates in _NEAREST_INPUTS.items():
+            found = next((c for c in candidates if shader.GetInput(c)), None)
+            fed = self._shaders.read(shader, found) if found else None
+            if fed is not None:
+                expressions[name] = fed
+                values[name] = to_value(context, shader.GetPath(), find_input(PREVIEW_INPUTS, name), fed)
+        if "diffuseColor" not in expressions:
             return StandardMaterial(uses_display_color=True), None
-        return self._standard(shader, sources, None)
-
-    # -- values
-
-    def _warn_of_unknown_inputs(
-        self, shader, table: tuple[MaterialInput, ...], ignored: frozenset[str], prefix: str = ""
-    ) -> None:
-        for shader_input in shader.GetInputs():
-            name = shader_input.GetBaseName()
-            if prefix and name.startswith(prefix):
-                continue
-            if find_input(table, name) is None and name not in ignored:
-                self._context.warn(
-                    shader.GetPath(), f"has no input '{name}'. The nearest is '{nearest_name(table, name)}'."
-                )
-
-    def _to_value(self, shader: UsdShade.Shader, row: MaterialInput, source: Source | None):
-        """The source as the core wants it: in metres, in range; the row's default where there is none."""
-        if source is None:
-            return row.default
-        if source.lookup is not None:
-            if row.takes_texture:
-                return _scaled(source.lookup, self._context.meters_per_unit**row.length_power)
-            self._context.warn(shader.GetPath(), f"{row.name} takes no texture. {row.default} is used.")
-            return row.default
-        try:
-            return self._checked(shader, row, source.value)
-        except (TypeError, ValueError):
-            self._context.warn(
-                shader.GetPath(), f"{row.name} must be a {row.kind}, got {source.value!r}. {row.default} is used."
-            )
-            return row.default
-
-    def _checked(self, shader: UsdShade.Shader, row: MaterialInput, value):
-        if row.kind == "bool":
-            return bool(value)
-        if row.kind == "token":
-            if str(value) in row.choices:
-                return str(value)
-            self._context.warn(
-                shader.GetPath(), f"{row.name} must be {row.rule}, got '{value}'. '{row.default}' is used."
-            )
-            return row.default
-        array = np.asarray(value, dtype=np.float64)
-        if row.kind == "color" and array.size == 1:
-            array = np.repeat(array.reshape(1), 3)
-        if row.kind == "float" and array.size == 3:
-            array = array.reshape(3).mean()  # a colour where a number is wanted
-        width = {"float": 1, "int": 1, "color": 3, "vector": 3, "floats": -1, "colors": 3}[row.kind]
-        array = array.reshape(-1, 3) if row.kind == "colors" else array.reshape(width)
-        array = array * self._context.meters_per_unit**row.length_power
-        if not np.isfinite(array).all():
-            self._context.warn(shader.GetPath(), f"{row.name} must be finite, got {value}. {row.default} is used.")
-            return row.default
-        if (array < row.minimum).any() or (array > row.maximum).any():
-            clamped = np.clip(array, row.minimum, row.maximum)
-            unit = {1: " m", -1: " 1/m", 0: ""}[row.length_power]
-            self._context.warn(
-                shader.GetPath(),
-                f"{row.name} must be {row.rule}{unit}, got {_text(array)}. {_text(clamped)} is used.",
-            )
-            array = clamped
-        if row.kind == "float":
-            return float(array[0])
-        if row.kind == "int":
-            return round(float(array[0]))
-        if row.kind == "colors":
-            return [tuple(color) for color in array.tolist()]
-        return tuple(array.tolist())
-
-
-def _text(array: np.ndarray) -> str:
-    values = ", ".join(f"{value:g}" for value in array.reshape(-1))
-    return values if array.size == 1 else f"({values})"
-
-
-def _scaled(lookup: TextureLookup, unit: float) -> TextureLookup:
-    """A lookup whose values are multiplied by a unit."""
-    if unit == 1.0:
-        return lookup
-    return TextureLookup(
-        lookup.texture,
-        lookup.first_channel,
-        [unit * x for x in lookup.scale],
-        [unit * x for x in lookup.bias],
-        lookup.st_scale,
-        lookup.st_rotation,
-        lookup.st_translation,
-    )
-
-
-def _texcoord_name(context: ReadContext, path, sources: dict[str, Source | None]) -> str | None:
-    names = list(dict.fromkeys(s.texcoord_name for s in sources.values() if s is not None and s.texcoord_name))
-    if len(names) > 1:
-        context.warn(path, f"reads textures by several primvars ({', '.join(names)}). '{names[0]}' is used for all.")
-    return names[0] if names else None
+        return self._standard(shader, values, expressions)
 
 
 def _any_surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:

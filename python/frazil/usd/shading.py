@@ -1,180 +1,236 @@
-"""Shader networks: what feeds an input - a constant, an image with its transform and primvar, or displayColor."""
+"""Shader networks: what feeds an input - numbers, an image with its transform and primvar, or displayColor."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
 from pxr import Sdf, UsdShade
 
-from .._frazil import Texture, TextureLookup
 from .context import ReadContext
-from .textures import TextureError, decode_srgb, is_srgb, read_image, resolve
+from .expression import Expression, Placement, image_expression
+from .mtlx_nodes import NodeReader, evaluate_node, node_kind
+from .textures import Image, open_image
 
-_CHANNELS = {"r": 0, "g": 1, "b": 2, "a": 3, "rgb": 0, "rgba": 0}
-_WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black", "useMetadata": "black"}
-_DISPLAY_COLOR_READERS = ("UsdPrimvarReader_float3", "UsdPrimvarReader_vector", "UsdPrimvarReader_color")
-
-
-@dataclass
-class Source:
-    """What feeds an input: exactly one of a value, a lookup, or the mesh's displayColor."""
-
-    value: object = None
-    lookup: TextureLookup | None = None
-    is_display_color: bool = False
-    texcoord_name: str | None = None
+_OUTPUT_CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2), "rgba": (0, 1, 2, 3)}
+_USD_WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black", "useMetadata": "black"}
+_MOST_STEPS = 64  # of a chain of texture coordinates
 
 
 class ShaderReader:
-    """Follows connections; each image is read once per colour space and wrap."""
+    """Follows connections; each node is worked out once, each image read once per colour space."""
 
     def __init__(self, context: ReadContext) -> None:
-        self._context = context
-        self._pixels: dict[str, tuple[np.ndarray, bool] | None] = {}
-        self._textures: dict[tuple, Texture] = {}
+        self.context = context
+        self.images: dict[tuple, Image | None] = {}
+        self._known: dict[tuple[str, str], Expression | None] = {}
+        self._open: set[tuple[str, str]] = set()
 
-    def read(self, shader: UsdShade.Shader, name: str) -> Source | None:
+    def read(self, shader: UsdShade.Shader, name: str) -> Expression | None:
         """What feeds an input of the shader; None where nothing is authored or it cannot be followed."""
-        shader_input = shader.GetInput(name)
-        if not shader_input:
-            return None
-        attributes = shader_input.GetValueProducingAttributes()
-        if not attributes:
-            return None
-        attribute = attributes[0]
-        if not UsdShade.Output.IsOutput(attribute):
-            value = self._context.get(attribute)
-            return None if value is None else Source(value=value)
-        node = UsdShade.Shader(attribute.GetPrim())
-        kind = node.GetShaderId() or ""
-        if kind == "UsdUVTexture":
-            return self._read_texture(node, UsdShade.Output(attribute).GetBaseName())
-        if kind in _DISPLAY_COLOR_READERS and self._value(node, "varname", "") in ("displayColor", "Cd"):
-            return Source(is_display_color=True)
-        if kind.startswith("UsdPrimvarReader"):
-            fallback = self._value(node, "fallback", None)
-            self._context.warn(
-                node.GetPath(),
-                f"reads the primvar '{self._value(node, 'varname', '')}' for '{name}', which is not supported. "
-                f"Its fallback is used.",
-            )
-            return None if fallback is None else Source(value=fallback)
-        self._context.warn(
-            node.GetPath(), f"is a '{kind}' node for '{name}', which is not supported. The default is used."
-        )
-        return None
+        return UsdNode(self, shader).input(name)
 
-    def _value(self, shader: UsdShade.Shader, name: str, default):
-        """A constant input (through material interfaces), or the default."""
-        shader_input = shader.GetInput(name)
-        if not shader_input:
-            return default
-        for attribute in shader_input.GetValueProducingAttributes():
-            if not UsdShade.Output.IsOutput(attribute):
-                return self._context.get(attribute, default)
-        return default
+    def token(self, shader: UsdShade.Shader, name: str) -> str | None:
+        """A constant text (through material interfaces)."""
+        value = UsdNode(self, shader).value(name)
+        return None if value is None else str(value)
 
-    def _read_texture(self, node: UsdShade.Shader, output: str) -> Source | None:
-        context = self._context
-        scale = np.asarray(self._value(node, "scale", (1, 1, 1, 1)), np.float32)
-        bias = np.asarray(self._value(node, "bias", (0, 0, 0, 0)), np.float32)
-        fallback = np.asarray(self._value(node, "fallback", (0, 0, 0, 1)), np.float32)
-        channel = _CHANNELS.get(output, 0)
-        is_color = output in ("rgb", "rgba")
+    def raw(self, shader: UsdShade.Shader, name: str):
+        """A constant as authored (through material interfaces); None where there is none, or a node feeds it."""
+        return UsdNode(self, shader).value(name)
 
-        texture = self._texture(node)
-        if texture is None:
-            value = fallback * scale + bias
-            return Source(value=tuple(map(float, value[:3])) if is_color else float(value[channel]))
-        channels = texture.texels.shape[2]
-        if channel >= channels:
-            if channels == 1 and channel < 3:
-                channel = 0  # grey
-            else:  # no alpha: opaque; a missing colour is black
-                return Source(value=float((1.0 if channel == 3 else 0.0) * scale[channel] + bias[channel]))
-        index = _CHANNELS.get(output, 0)
-        lookup_scale = scale[:3] if is_color else np.repeat(scale[index], 3)
-        lookup_bias = bias[:3] if is_color else np.repeat(bias[index], 3)
-        texcoords = self._read_texcoords(node)
-        lookup = TextureLookup(
-            texture,
-            channel,
-            lookup_scale.tolist(),
-            lookup_bias.tolist(),
-            **{key: texcoords[key] for key in ("st_scale", "st_rotation", "st_translation")},
-        )
-        if not np.isfinite(scale).all() or not np.isfinite(bias).all():
-            context.warn(node.GetPath(), "scale and bias must be finite. The texture is left out.")
+    def shader_of(self, shader: UsdShade.Shader, name: str) -> UsdShade.Shader | None:
+        """The node that feeds an input."""
+        found = UsdNode(self, shader).upstream(name)
+        return found[0].shader if found else None
+
+    def evaluate(self, node: UsdNode, output: str) -> Expression | None:
+        """One output of a node; None, after a warning, where it is not supported or fed by itself."""
+        key = (node.path, output)
+        if key in self._open:
+            self.context.warn(node.path, "is part of a cycle of connections. The default is used.")
             return None
-        return Source(lookup=lookup, texcoord_name=texcoords["name"])
-
-    def _texture(self, node: UsdShade.Shader) -> Texture | None:
-        """The node's image, or None (after a warning) where there is none to read."""
-        context = self._context
-        file_input = node.GetInput("file")
-        attributes = file_input.GetValueProducingAttributes() if file_input else []
-        asset = context.get(attributes[0]) if attributes else None
-        if not isinstance(asset, Sdf.AssetPath) or not asset.path:
-            context.warn(node.GetPath(), "names no image in 'file'. Its fallback is used.")
-            return None
-        attribute = attributes[0]
-        if "<UDIM>" in asset.path:
-            context.warn(node.GetPath(), "UDIM tiles are not supported. Tile 1001 is used everywhere.")
-            asset = Sdf.AssetPath(asset.path.replace("<UDIM>", "1001"))
-        path = resolve(context, asset, attribute)
-        if path not in self._pixels:
-            self._pixels[path] = None
+        if key not in self._known:
+            self._open.add(key)
             try:
-                if not path:
-                    raise TextureError(f"@{asset.path}@ cannot be found.")
-                self._pixels[path] = read_image(path)
-            except OSError as error:
-                context.warn(node.GetPath(), f"{error} The texture's fallback is used.")
-        loaded = self._pixels[path]
-        if loaded is None:
-            return None
-        pixels, is_8_bit = loaded
-        color_space = self._value(node, "sourceColorSpace", None) or attribute.GetColorSpace() or "auto"
-        decode = is_srgb(str(color_space), is_8_bit, pixels.shape[2])
-        wraps = tuple(_WRAPS.get(str(self._value(node, name, "useMetadata")), "repeat") for name in ("wrapS", "wrapT"))
-        key = (path, decode, wraps)
-        if key not in self._textures:
-            if pixels.shape[2] == 2:  # grey and alpha
-                pixels = pixels[..., [0, 0, 0, 1]]
-            texels = decode_srgb(pixels) if decode else pixels
-            if not np.isfinite(texels).all():
-                context.warn(node.GetPath(), f"{path} has NaN or infinite pixels. They are taken as 0.")
-                texels = np.nan_to_num(texels, nan=0.0, posinf=0.0, neginf=0.0)
-            self._textures[key] = Texture(np.ascontiguousarray(texels, dtype=np.float32), *wraps)
-        return self._textures[key]
+                self._known[key] = self._evaluate(node, output)
+            finally:
+                self._open.discard(key)
+        return self._known[key]
 
-    def _read_texcoords(self, node: UsdShade.Shader) -> dict:
-        """The primvar and the UsdTransform2d between it and the image."""
-        result = {"name": "st", "st_scale": (1.0, 1.0), "st_rotation": 0.0, "st_translation": (0.0, 0.0)}
-        reader, transforms = self._upstream(node, "st"), 0
-        while reader is not None and reader.GetShaderId() == "UsdTransform2d":
-            transforms += 1
-            if transforms == 1:
-                result["st_scale"] = tuple(map(float, self._value(reader, "scale", (1, 1))))
-                result["st_rotation"] = float(self._value(reader, "rotation", 0.0))
-                result["st_translation"] = tuple(map(float, self._value(reader, "translation", (0, 0))))
+    def _evaluate(self, node: UsdNode, output: str) -> Expression | None:
+        kind = node.kind
+        if kind == "UsdUVTexture":
+            return self._read_uv_texture(node, output)
+        if kind.startswith("UsdPrimvarReader"):
+            if node.value("varname") in ("displayColor", "Cd"):
+                return Expression(np.zeros(3), is_display_color=True)
+            self.context.warn(
+                node.path,
+                f"reads the primvar '{node.value('varname') or ''}', which is not supported. Its fallback is used.",
+            )
+            return node.input("fallback")
+        return evaluate_node(self, node, output)
+
+    def _read_uv_texture(self, node: UsdNode, output: str) -> Expression | None:
+        scale = np.resize(np.asarray(_or(node.value("scale"), (1, 1, 1, 1)), np.float64), 4)
+        bias = np.resize(np.asarray(_or(node.value("bias"), (0, 0, 0, 0)), np.float64), 4)
+        fallback = np.resize(np.asarray(_or(node.value("fallback"), (0, 0, 0, 1)), np.float64), 4)
+        if not np.isfinite(scale).all() or not np.isfinite(bias).all():
+            self.context.warn(node.path, "scale and bias must be finite. The texture is left out.")
+            return None
+        channels = _OUTPUT_CHANNELS.get(output, (0, 1, 2))
+        wraps = tuple(_USD_WRAPS.get(str(_or(node.value(n), "useMetadata")), "repeat") for n in ("wrapS", "wrapT"))
+        size = node.value("frazil:triplanarSize")
+        placement = self.placement(node, "st", wraps)
+        if size is not None and float(size) > 0:
+            placement = placement.with_triplanar(float(size) * self.context.meters_per_unit)
+        image = self.open_file(node, "file", _or(node.value("sourceColorSpace"), None), "auto", fallback)
+        at = list(channels)
+        if image is None:
+            return Expression((fallback * scale + bias)[at])
+        return image_expression(image, at, scale[at], bias[at], placement)
+
+    def open_file(self, node, name: str, color_space, default_space: str, fallback: np.ndarray) -> Image | None:
+        """The image of a node's file input, or None after a warning."""
+        asset, attribute, authored_space = node.file(name)
+        if asset is None or not asset.path:
+            self.context.warn(node.path, f"names no image in '{name}'. Its fallback is used.")
+            return None
+        space = str(color_space or authored_space or default_space)
+        image = open_image(self.context, node.path, asset, attribute, space, self.images)
+        if image is not None:
+            image.missing = tuple(float(v) for v in fallback)
+            # A picture that cannot be decoded is found now, while there is a fallback to use.
+            if image.to_texture(self.context, node.path, ("repeat", "repeat")) is None:
+                return None
+        return image
+
+    # -- texture coordinates
+
+    def placement(self, node, name: str, wraps: tuple[str, str]) -> Placement:
+        """How an image is laid on that reads its coordinates from an input."""
+        chain = []
+        found = node.upstream(name)
+        while found is not None and len(chain) < _MOST_STEPS:
+            chain.append(found[0])
+            next_name = next((n for n in _COORDINATE_INPUTS if found[0].upstream(n)), None)
+            found = found[0].upstream(next_name) if next_name else None
+        primvar, matrix, offset = "st", np.eye(2), np.zeros(2)
+        for step in reversed(chain):
+            kind = step.kind
+            if kind.startswith("UsdPrimvarReader") or kind == "geompropvalue":
+                primvar = str(step.value("varname") or step.value("geomprop") or "st")
+            elif kind == "texcoord":
+                number = int(step.value("index") or 0)
+                primvar = "st" if number == 0 else f"st{number}"
+            elif (move := _coordinate_step(step)) is not None:
+                matrix, offset = matrix @ move[0], offset @ move[0] + move[1]
             else:
-                self._context.warn(
-                    reader.GetPath(), "a second UsdTransform2d in a row is not supported. It is left out."
+                self.context.warn(
+                    step.path, f"is a '{kind}' node for texture coordinates, which is not supported. It is left out."
                 )
-            if transforms > 8:
-                break
-            reader = self._upstream(reader, "in")
-        if reader is not None and (reader.GetShaderId() or "").startswith("UsdPrimvarReader"):
-            result["name"] = str(self._value(reader, "varname", "st") or "st")
-        return result
+        if primvar in ("UV0", "UV1"):
+            primvar = "st" if primvar == "UV0" else "st1"
+        return Placement(primvar, tuple(matrix.reshape(4).tolist()), tuple(offset.tolist()), wraps)
 
-    def _upstream(self, node: UsdShade.Shader, name: str) -> UsdShade.Shader | None:
-        shader_input = node.GetInput(name)
-        if not shader_input:
-            return None
-        for attribute in shader_input.GetValueProducingAttributes():
-            if UsdShade.Output.IsOutput(attribute):
-                return UsdShade.Shader(attribute.GetPrim())
+
+_COORDINATE_INPUTS = ("in", "texcoord", "in1", "st", "in2")
+
+
+def _or(value, default):
+    return default if value is None else value
+
+
+def _turn(degrees: float) -> np.ndarray:
+    """For row vectors, counter-clockwise."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return np.array([[c, s], [-s, c]])
+
+
+def _coordinate_step(node) -> tuple[np.ndarray, np.ndarray] | None:
+    """What a node does to coordinates: st @ matrix + offset."""
+
+    def pair(name: str, default: float) -> np.ndarray:
+        return np.resize(np.asarray(_or(node.value(name), default), np.float64), 2)
+
+    kind = node.kind
+    if kind == "UsdTransform2d":
+        turn = _turn(float(_or(node.value("rotation"), 0.0)))
+        return np.diag(pair("scale", 1.0)) @ turn, pair("translation", 0.0)
+    if kind == "place2d":
+        pivot, shrink, move = pair("pivot", 0.0), np.diag(1.0 / _nonzero(pair("scale", 1.0))), pair("offset", 0.0)
+        turn = _turn(-float(_or(node.value("rotate"), 0.0)))
+        if int(_or(node.value("operationorder"), 0)) == 0:
+            return shrink @ turn, -pivot @ shrink @ turn - move + pivot
+        return turn @ shrink, (-pivot - move) @ turn @ shrink + pivot
+    if kind == "rotate2d":
+        return _turn(-float(_or(node.value("amount"), 0.0))), np.zeros(2)
+    other = "in1" if node.upstream("in2") and not node.upstream("in1") else "in2"
+    if kind == "multiply":
+        return np.diag(pair(other, 1.0)), np.zeros(2)
+    if kind == "divide" and other == "in2":
+        return np.diag(1.0 / _nonzero(pair("in2", 1.0))), np.zeros(2)
+    if kind == "add":
+        return np.eye(2), pair(other, 0.0)
+    if kind == "subtract":
+        return (np.eye(2), -pair("in2", 0.0)) if other == "in2" else (-np.eye(2), pair("in1", 0.0))
+    if kind in ("dot", "constant"):
+        return np.eye(2), np.zeros(2)
+    return None
+
+
+def _nonzero(values: np.ndarray) -> np.ndarray:
+    return np.where(values == 0.0, 1.0, values)
+
+
+class UsdNode(NodeReader):
+    """A node of a UsdShade network."""
+
+    def __init__(self, reader: ShaderReader, shader: UsdShade.Shader) -> None:
+        self._reader = reader
+        self.shader = shader
+        self.path = str(shader.GetPath())
+        self.id = str(shader.GetShaderId() or "")
+        self.kind = node_kind(self.id)
+
+    def _sources(self, name: str):
+        shader_input = self.shader.GetInput(name)
+        return shader_input.GetValueProducingAttributes() if shader_input else []
+
+    def value(self, name: str):
+        """A constant (through material interfaces), as USD has it; one that constant nodes feed, as an array."""
+        for attribute in self._sources(name):
+            if not UsdShade.Output.IsOutput(attribute):
+                return self._reader.context.get(attribute)
+            fed = self.input(name)
+            return fed.bias if fed is not None and fed.image is None else None
         return None
+
+    def input(self, name: str) -> Expression | None:
+        """What feeds an input."""
+        for attribute in self._sources(name):
+            if UsdShade.Output.IsOutput(attribute):
+                node = UsdNode(self._reader, UsdShade.Shader(attribute.GetPrim()))
+                return self._reader.evaluate(node, UsdShade.Output(attribute).GetBaseName())
+            value = self._reader.context.get(attribute)
+            return None if value is None or isinstance(value, str) else Expression.constant(value)
+        return None
+
+    def upstream(self, name: str):
+        """The node that feeds an input, and its output's name."""
+        for attribute in self._sources(name):
+            if UsdShade.Output.IsOutput(attribute):
+                node = UsdNode(self._reader, UsdShade.Shader(attribute.GetPrim()))
+                return node, UsdShade.Output(attribute).GetBaseName()
+        return None
+
+    def file(self, name: str):
+        """Asset path, the attribute that has it, and the colour space that is authored there."""
+        for attribute in self._sources(name):
+            asset = self._reader.context.get(attribute)
+            if isinstance(asset, str):
+                asset = Sdf.AssetPath(asset)
+            if isinstance(asset, Sdf.AssetPath):
+                return asset, attribute, attribute.GetColorSpace() or ""
+        return None, None, ""

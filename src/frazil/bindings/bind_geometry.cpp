@@ -1,7 +1,9 @@
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 
 #include "frazil/bindings/bindings.h"
 #include "frazil/geometry/mesh.h"
+#include "frazil/geometry/refinement.h"
 #include "frazil/geometry/subdivision.h"
 
 namespace frazil {
@@ -130,6 +132,32 @@ void bind_control_mesh(nb::module_& module) {
         },
         "cage"_a, "level"_a, "path"_a = "ControlMesh",
         "The Catmull-Clark limit surface, `level` quads along each edge: (Mesh, the face of each triangle).");
+    module.def(
+        "cut_long_edges",
+        [](const Mesh& mesh, float edge_length, std::size_t most_triangles) {
+            CutMesh cut;
+            {
+                nb::gil_scoped_release released;
+                cut = cut_long_edges(mesh, edge_length, most_triangles);
+            }
+            const float longest = cut.longest_edge;
+            return std::tuple(std::move(cut.mesh), to_array(std::move(cut.parents)), longest);
+        },
+        "mesh"_a, "edge_length"_a, "most_triangles"_a = std::size_t(4000000),
+        "Halve edges until none is longer than edge_length: (Mesh, the triangle that each was cut from (F,) int32, "
+        "the\n"
+        "longest edge that is left). No more than most_triangles are made.");
+    module.def(
+        "displaced",
+        [](const Mesh& mesh, const FloatArray& offsets) {
+            const std::vector<V3f> vectors = to_vectors3(offsets, "displaced: offsets");
+            nb::gil_scoped_release released;
+            return displaced(mesh, vectors);
+        },
+        "mesh"_a, "offsets"_a,
+        "Move the vertices by offsets (3F, 3) at the corners of the triangles, their mean at each vertex, and give "
+        "the\n"
+        "shape its normals. No cracks open.");
 }
 
 }  // namespace

@@ -1,24 +1,20 @@
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/variant.h>
 
 #include <cstring>
 
 #include "frazil/bindings/bindings.h"
+#include "frazil/material/displacement.h"
 #include "frazil/material/ice.h"
 #include "frazil/material/standard.h"
 
 namespace frazil {
 namespace {
 
-using Triple = std::array<float, 3>;
-using Pair = std::array<float, 2>;
 // What a material input is given as: a constant or a texture.
 using ColorInput = std::variant<TextureLookup, Triple>;
 using FloatInput = std::variant<TextureLookup, float>;
 
-constexpr std::pair<Wrap, const char*> kWrapNames[] = {
-    {Wrap::repeat, "repeat"}, {Wrap::clamp, "clamp"}, {Wrap::mirror, "mirror"}, {Wrap::black, "black"}};
 const std::pair<CompensationMode, const char*> kCompensationNames[] = {
     {CompensationMode::off, compensation_name(CompensationMode::off)},
     {CompensationMode::ratio, compensation_name(CompensationMode::ratio)},
@@ -26,31 +22,6 @@ const std::pair<CompensationMode, const char*> kCompensationNames[] = {
     {CompensationMode::depth, compensation_name(CompensationMode::depth)},
     {CompensationMode::fill, compensation_name(CompensationMode::fill)},
     {CompensationMode::linear, compensation_name(CompensationMode::linear)}};
-
-template <class Enum, std::size_t N>
-Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {
-    std::string known;
-    for (const auto& [value, text] : names) {
-        if (name == text) return value;
-        known += (known.empty() ? "" : ", ") + std::string(text);
-    }
-    throw ValueError(str(what, " must be one of ", known, ", got '", name, "'."));
-}
-
-template <class Enum, std::size_t N>
-const char* to_name(const std::pair<Enum, const char*> (&names)[N], Enum value) {
-    for (const auto& [known, text] : names) {
-        if (known == value) return text;
-    }
-    return "";
-}
-
-V3f to_v3f(const Triple& t) {
-    return {t[0], t[1], t[2]};
-}
-Triple from_v3f(const V3f& v) {
-    return {v.x, v.y, v.z};
-}
 
 MaterialInput<Rgb> to_input(const ColorInput& input) {
     if (const auto* lookup = std::get_if<TextureLookup>(&input)) return {Rgb(0.0f), *lookup};
@@ -78,101 +49,32 @@ void def_input(Class& cls, const char* name, MaterialInput<Value> Model::*member
         [member](Model& model, const Input& input) { model.*member = to_input(input); });
 }
 
-void bind_texture(nb::module_& module) {
-    nb::class_<Texture>(module, "Texture",
-                        "An image on a surface.\n\n"
-                        "Parameters\n----------\n"
-                        "texels : (height, width, channels) float32, linear, 1 to 4 channels, row 0 on top. Copied.\n"
-                        "wrap_s, wrap_t : 'repeat', 'clamp', 'mirror' or 'black'.")
-        .def(
-            "__init__",
-            [](Texture* self, const nb::ndarray<const float, nb::ndim<3>, nb::c_contig, nb::device::cpu>& texels,
-               const std::string& wrap_s, const std::string& wrap_t) {
-                if (texels.size() == 0 || texels.shape(2) > 4) {
-                    throw ValueError(str("Texture: texels must have shape (height, width, 1..4), got (",
-                                         texels.shape(0), ", ", texels.shape(1), ", ", texels.shape(2), ")."));
-                }
-                new (self) Texture{int(texels.shape(1)),
-                                   int(texels.shape(0)),
-                                   int(texels.shape(2)),
-                                   std::vector<float>(texels.data(), texels.data() + texels.size()),
-                                   from_name(kWrapNames, wrap_s, "Texture: wrap_s"),
-                                   from_name(kWrapNames, wrap_t, "Texture: wrap_t")};
-            },
-            "texels"_a, "wrap_s"_a = "repeat", "wrap_t"_a = "repeat")
-        .def_prop_ro("texels",
-                     [](Texture& texture) {
-                         return view(
-                             texture.texels.data(),
-                             {std::size_t(texture.height), std::size_t(texture.width), std::size_t(texture.channels)},
-                             nb::find(texture));
-                     })
-        .def_prop_ro("wrap_s", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_s); })
-        .def_prop_ro("wrap_t", [](const Texture& texture) { return to_name(kWrapNames, texture.wrap_t); })
-        .def("__repr__", [](const Texture& texture) {
-            return str("Texture(", texture.width, "x", texture.height, ", ", texture.channels, " channels)");
-        });
-
-    nb::class_<TextureLookup>(module, "TextureLookup",
-                              "How a material input reads a texture: texel * scale + bias, at\n"
-                              "st' = rotate(st * st_scale, st_rotation degrees) + st_translation.\n\n"
-                              "Parameters\n----------\n"
-                              "texture : Texture, shared, not copied.\n"
-                              "first_channel : 0..3; a scalar input reads this channel, a colour three from it on.")
-        .def(
-            "__init__",
-            [](TextureLookup* self, const std::shared_ptr<Texture>& texture, int first_channel, const Triple& scale,
-               const Triple& bias, const Pair& st_scale, float st_rotation, const Pair& st_translation) {
-                if (first_channel < 0 || first_channel > 3) {
-                    throw ValueError(str("TextureLookup: first_channel must be in 0..3, got ", first_channel, "."));
-                }
-                new (self) TextureLookup{texture,
-                                         first_channel,
-                                         to_v3f(scale),
-                                         to_v3f(bias),
-                                         V2f(st_scale[0], st_scale[1]),
-                                         V2f(st_translation[0], st_translation[1]),
-                                         st_rotation};
-            },
-            "texture"_a, "first_channel"_a = 0, "scale"_a = Triple{1, 1, 1}, "bias"_a = Triple{0, 0, 0},
-            "st_scale"_a = Pair{1, 1}, "st_rotation"_a = 0.0f, "st_translation"_a = Pair{0, 0})
-        .def_prop_ro("texture",
-                     [](const TextureLookup& lookup) { return std::const_pointer_cast<Texture>(lookup.texture); })
-        .def_ro("first_channel", &TextureLookup::first_channel)
-        .def_prop_ro("scale", [](const TextureLookup& lookup) { return from_v3f(lookup.scale); })
-        .def_prop_ro("bias", [](const TextureLookup& lookup) { return from_v3f(lookup.bias); })
-        .def_prop_ro("st_scale",
-                     [](const TextureLookup& lookup) {
-                         return Pair{lookup.st_scale.x, lookup.st_scale.y};
-                     })
-        .def_prop_ro("st_translation",
-                     [](const TextureLookup& lookup) {
-                         return Pair{lookup.st_translation.x, lookup.st_translation.y};
-                     })
-        .def_ro("st_rotation", &TextureLookup::st_rotation)
-        .def("__repr__", [](const TextureLookup& lookup) {
-            return str("TextureLookup(", lookup.texture ? str(lookup.texture->width, "x", lookup.texture->height) : "",
-                       ", channel ", lookup.first_channel, ")");
-        });
+template <class Model, class Class>
+void def_normal(Class& cls) {
+    cls.def_prop_rw(
+        "normal", [](const Model& model) { return model.normal.texture ? std::optional(model.normal) : std::nullopt; },
+        [](Model& model, const std::optional<TextureLookup>& map) { model.normal = map.value_or(TextureLookup{}); },
+        "value"_a.none());
 }
 
 void bind_standard(nb::module_& module) {
     const StandardMaterial preset;
     nb::class_<StandardMaterial> cls(module, "StandardMaterial",
                                      "UsdPreviewSurface. Inputs take a constant or a TextureLookup; the names and\n"
-                                     "defaults are the specification's, in snake_case.");
+                                     "defaults are the specification's, in snake_case. bump: height in metres, a\n"
+                                     "TextureLookup.");
     cls.def(
         "__init__",
         [](StandardMaterial* self, const ColorInput& diffuse_color, bool uses_display_color,
            const ColorInput& emissive_color, bool use_specular_workflow, const ColorInput& specular_color,
            const FloatInput& metallic, const FloatInput& roughness, const FloatInput& clearcoat,
            const FloatInput& clearcoat_roughness, const FloatInput& opacity, float opacity_threshold, float ior,
-           const std::optional<TextureLookup>& normal) {
+           const std::optional<TextureLookup>& normal, const FloatInput& bump) {
             new (self) StandardMaterial{
-                to_input(diffuse_color),         uses_display_color, to_input(emissive_color), use_specular_workflow,
-                to_input(specular_color),        to_input(metallic), to_input(roughness),      to_input(clearcoat),
-                to_input(clearcoat_roughness),   to_input(opacity),  opacity_threshold,        ior,
-                normal.value_or(TextureLookup{})};
+                to_input(diffuse_color),          uses_display_color, to_input(emissive_color), use_specular_workflow,
+                to_input(specular_color),         to_input(metallic), to_input(roughness),      to_input(clearcoat),
+                to_input(clearcoat_roughness),    to_input(opacity),  opacity_threshold,        ior,
+                normal.value_or(TextureLookup{}), to_input(bump)};
         },
         nb::kw_only(), "diffuse_color"_a = ColorInput(from_v3f(preset.diffuse_color.value)),
         "uses_display_color"_a = false, "emissive_color"_a = ColorInput(Triple{0, 0, 0}),
@@ -181,7 +83,7 @@ void bind_standard(nb::module_& module) {
         "clearcoat"_a = FloatInput(preset.clearcoat.value),
         "clearcoat_roughness"_a = FloatInput(preset.clearcoat_roughness.value),
         "opacity"_a = FloatInput(preset.opacity.value), "opacity_threshold"_a = 0.0f, "ior"_a = preset.ior,
-        "normal"_a = nb::none());
+        "normal"_a = nb::none(), "bump"_a = FloatInput(0.0f));
     def_input(cls, "diffuse_color", &StandardMaterial::diffuse_color);
     def_input(cls, "emissive_color", &StandardMaterial::emissive_color);
     def_input(cls, "specular_color", &StandardMaterial::specular_color);
@@ -190,14 +92,12 @@ void bind_standard(nb::module_& module) {
     def_input(cls, "clearcoat", &StandardMaterial::clearcoat);
     def_input(cls, "clearcoat_roughness", &StandardMaterial::clearcoat_roughness);
     def_input(cls, "opacity", &StandardMaterial::opacity);
+    def_input(cls, "bump", &StandardMaterial::bump);
+    def_normal<StandardMaterial>(cls);
     cls.def_rw("uses_display_color", &StandardMaterial::uses_display_color)
         .def_rw("use_specular_workflow", &StandardMaterial::use_specular_workflow)
         .def_rw("opacity_threshold", &StandardMaterial::opacity_threshold)
         .def_rw("ior", &StandardMaterial::ior)
-        .def_prop_ro("normal",
-                     [](const StandardMaterial& model) {
-                         return model.normal.texture ? std::optional(model.normal) : std::nullopt;
-                     })
         .def("__repr__", [](const StandardMaterial& model) {
             const Rgb& c = model.diffuse_color.value;
             if (model.uses_display_color) return std::string("StandardMaterial(displayColor)");
@@ -206,6 +106,8 @@ void bind_standard(nb::module_& module) {
         });
 }
 
+constexpr std::pair<VectorSpace, const char*> kSpaceNames[] = {{VectorSpace::tangent, "tangent"},
+                                                               {VectorSpace::object, "object"}};
 constexpr std::pair<PatternKind, const char*> kPatternNames[] = {
     {PatternKind::solid, "solid"}, {PatternKind::fracture, "fracture"}, {PatternKind::cells, "cells"},
     {PatternKind::frost, "frost"}, {PatternKind::bubbles, "bubbles"},   {PatternKind::snow, "snow"},
@@ -341,7 +243,9 @@ void bind_ice(nb::module_& module) {
         "compensation : 'off', 'ratio', 'conserve', 'depth', 'fill' or 'linear'; compensation_limit >= 1;\n"
         "    compensation_strength in [0, 1].\n"
         "spacing : of the points, metres; 0 = from the mean free path. A TextureLookup is read at the mesh's "
-        "vertices.\n\n"
+        "vertices.\n"
+        "normal : tangent-space normal map, a TextureLookup (usually scale 2, bias -1), or None.\n"
+        "bump : height in metres, a TextureLookup.\n\n"
         "Ranges are checked when the scene is rendered.");
     cls.def(
         "__init__",
@@ -350,7 +254,8 @@ void bind_ice(nb::module_& module) {
            float volume, float anisotropy, int priority, const std::vector<Overlay>& overlays, float age,
            const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
            bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
-           float compensation_strength, const FloatInput& spacing) {
+           float compensation_strength, const FloatInput& spacing, const std::optional<TextureLookup>& normal,
+           const FloatInput& bump) {
             IceMaterial model;
             model.medium = medium;
             model.roughness = to_input(roughness);
@@ -369,6 +274,8 @@ void bind_ice(nb::module_& module) {
             model.compensation = {from_name(kCompensationNames, compensation, "IceMaterial: compensation"),
                                   compensation_limit, compensation_strength};
             model.spacing = to_input(spacing);
+            model.normal = normal.value_or(TextureLookup{});
+            model.bump = to_input(bump);
             model.profile = profile_named(profile, "IceMaterial");
             new (self) IceMaterial(std::move(model));
         },
@@ -377,9 +284,12 @@ void bind_ice(nb::module_& module) {
         "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "priority"_a = 0, "overlays"_a = std::vector<Overlay>(),
         "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
         "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
-        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f));
+        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f),
+        "normal"_a = nb::none(), "bump"_a = FloatInput(0.0f));
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);
+    def_input(cls, "bump", &IceMaterial::bump);
+    def_normal<IceMaterial>(cls);
     def_input(cls, "spacing", &IceMaterial::spacing);
     cls.def_rw("medium", &IceMaterial::medium)
         .def_rw("specular", &IceMaterial::specular)
@@ -430,6 +340,49 @@ void bind_ice(nb::module_& module) {
         });
 }
 
+void bind_displacement(nb::module_& module) {
+    nb::class_<Displacement>(
+        module, "Displacement",
+        "What moves a surface before points and rays meet it. Lengths in the mesh's own units.\n\n"
+        "Parameters\n----------\n"
+        "height : along the normal; a constant or a TextureLookup.\n"
+        "vector : takes the place of height; a TextureLookup or a constant, in `space` 'tangent' (along s, along t,\n"
+        "    normal) or 'object'.\n"
+        "pattern : an Overlay, whose pattern (not its opacity or mask) multiplies either; metres.")
+        .def(
+            "__init__",
+            [](Displacement* self, const FloatInput& height, const std::optional<ColorInput>& vector,
+               const std::string& space, const std::optional<Overlay>& pattern) {
+                Displacement made;
+                made.height = to_input(height);
+                if (vector) made.vector = to_input(*vector);
+                made.space = from_name(kSpaceNames, space, "Displacement: space");
+                if (pattern) made.pattern = pattern->pattern;
+                check_displacement(made, "Displacement");
+                new (self) Displacement(std::move(made));
+            },
+            nb::kw_only(), "height"_a = FloatInput(0.0f), "vector"_a = nb::none(), "space"_a = "tangent",
+            "pattern"_a = nb::none())
+        .def_prop_ro("height", [](const Displacement& d) { return from_input(d.height); })
+        .def_prop_ro(
+            "vector",
+            [](const Displacement& d) { return d.vector ? std::optional(from_input(*d.vector)) : std::nullopt; })
+        .def_prop_ro("space", [](const Displacement& d) { return to_name(kSpaceNames, d.space); })
+        .def(
+            "eval",
+            [](const Displacement& displacement, const Mesh& mesh, float metres_per_unit) {
+                std::vector<V3f> offsets;
+                {
+                    nb::gil_scoped_release released;
+                    offsets = eval_displacement(displacement, mesh, metres_per_unit);
+                }
+                auto* kept = new std::vector<V3f>(std::move(offsets));
+                nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<std::vector<V3f>*>(memory); });
+                return nb::ndarray<nb::numpy, float, nb::ndim<2>>(kept->data(), {kept->size(), 3}, owner);
+            },
+            "mesh"_a, "metres_per_unit"_a = 1.0f, "Offsets (3F, 3) at the corners of a mesh, for displaced().");
+}
+
 }  // namespace
 
 void bind_material(nb::module_& module) {
@@ -437,6 +390,7 @@ void bind_material(nb::module_& module) {
     bind_standard(module);
     bind_overlay(module);
     bind_ice(module);
+    bind_displacement(module);
 }
 
 }  // namespace frazil

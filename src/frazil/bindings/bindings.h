@@ -6,6 +6,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -41,6 +42,35 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
     return nb::ndarray<nb::numpy, T>(data, shape, owner);
 }
 
+// Three and two numbers, as tuples.
+using Triple = std::array<float, 3>;
+using Pair = std::array<float, 2>;
+inline V3f to_v3f(const Triple& t) {
+    return {t[0], t[1], t[2]};
+}
+inline Triple from_v3f(const V3f& v) {
+    return {v.x, v.y, v.z};
+}
+
+// Values of an enum by their names; ValueError, with all names, for any other.
+template <class Enum, std::size_t N>
+Enum from_name(const std::pair<Enum, const char*> (&names)[N], const std::string& name, const char* what) {
+    std::string known;
+    for (const auto& [value, text] : names) {
+        if (name == text) return value;
+        known += (known.empty() ? "" : ", ") + std::string(text);
+    }
+    throw ValueError(str(what, " must be one of ", known, ", got '", name, "'."));
+}
+
+template <class Enum, std::size_t N>
+const char* to_name(const std::pair<Enum, const char*> (&names)[N], Enum value) {
+    for (const auto& [known, text] : names) {
+        if (known == value) return text;
+    }
+    return "";
+}
+
 // A (4, 4) float64 matrix for row vectors, as USD's GfMatrix4d and Imath have it.
 using MatrixArray = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 M44f to_matrix(const MatrixArray& array);
@@ -52,6 +82,7 @@ Estimator estimator_named(const std::string& name);
 
 void bind_geometry(nb::module_& module);
 void bind_material(nb::module_& module);
+void bind_texture(nb::module_& module);
 void bind_points(nb::module_& module);
 void bind_translucency(nb::module_& module);
 void bind_lighting(nb::module_& module);

@@ -31,6 +31,8 @@ struct IceMaterial {
     float age = 0.5f;                        // 0 = fresh .. 1 = old: how much of its opacity each overlay has
     int priority = 0;                        // where bodies overlap, the highest fills the place
     MaterialInput<Rgb> tint{Rgb(1.0f), {}};  // multiplies what leaves the core
+    TextureLookup normal;                    // tangent-space normal map
+    MaterialInput<float> bump{0.0f, {}};     // height, metres; a texture
     Ramp ramp;
     Compensation compensation;
     // Of the points, metres; 0 = from the mean free path. A texture is read at the mesh's vertices.

@@ -33,19 +33,19 @@ float age_weight(const Overlay& overlay, float age) {
 namespace {
 
 // An overlay's opacity where its pattern is full.
-float strength_at(const Overlay& overlay, float age, const V2f& st) {
+float strength_at(const Overlay& overlay, float age, const TexturePoint& texture_at) {
     const float strength = overlay.opacity * age_weight(overlay, age);
-    return strength > 0.0f ? strength * std::clamp(eval_float(overlay.mask, st), 0.0f, 1.0f) : 0.0f;
+    return strength > 0.0f ? strength * std::clamp(eval_float(overlay.mask, texture_at), 0.0f, 1.0f) : 0.0f;
 }
 
 }  // namespace
 
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const V2f& st, bool with_slope) {
+                       const TexturePoint& texture_at, bool with_slope) {
     Covering all;
-    all.roughness = roughness;
+    all.roughness = all.bare_roughness = roughness;
     for (const Overlay& overlay : overlays) {
-        const float strength = strength_at(overlay, age, st);
+        const float strength = strength_at(overlay, age, texture_at);
         if (!(strength > 0.0f)) continue;
         PatternPoint at = point;
         const float mask = eval_pattern(overlay.pattern, at);
@@ -70,10 +70,10 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
 }
 
 std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
-                                           const V2f& st) {
+                                           const TexturePoint& texture_at) {
     std::vector<float> opacity(overlays.size());
     for (std::size_t k = 0; k < overlays.size(); ++k) {
-        const float strength = strength_at(overlays[k], age, st);
+        const float strength = strength_at(overlays[k], age, texture_at);
         if (strength > 0.0f) opacity[k] = strength * eval_pattern(overlays[k].pattern, point);
     }
     std::vector<CoveringSlope> slopes(overlays.size());

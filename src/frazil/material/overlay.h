@@ -38,17 +38,17 @@ float age_weight(const Overlay& overlay, float age);
 
 // What the overlays make of a place on the surface.
 struct Covering {
-    float covered = 0.0f;         // of what would be seen through the surface
-    float scattered = 0.0f;       // of the light that would enter
-    Rgb reflectance = Rgb(0.0f);  // diffuse, scattered times colour
-    Rgb tint = Rgb(1.0f);         // of what leaves the body
-    float roughness = 0.0f;
-    V3f slope = V3f(0.0f);  // gradient of height in rest space
+    float covered = 0.0f;                           // of what would be seen through the surface
+    float scattered = 0.0f;                         // of the light that would enter
+    Rgb reflectance = Rgb(0.0f);                    // diffuse, scattered times colour
+    Rgb tint = Rgb(1.0f);                           // of what leaves the body
+    float roughness = 0.0f, bare_roughness = 0.0f;  // with the overlays, and without
+    V3f slope = V3f(0.0f);                          // gradient of height in rest space
 };
 
 // `roughness` is the bare surface's. The slope is left 0 unless `with_slope`.
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const V2f& st, bool with_slope);
+                       const TexturePoint& at, bool with_slope);
 
 // How a covering changes with one overlay's opacity: derivatives by its logarithm.
 struct CoveringSlope {
@@ -58,6 +58,6 @@ struct CoveringSlope {
 
 // One for each overlay.
 std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
-                                           const V2f& st);
+                                           const TexturePoint& at);
 
 }  // namespace frazil

@@ -16,22 +16,23 @@ Rgb schlick_average(const Rgb& f0) {
 
 }  // namespace
 
-StandardBsdf::StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color, float blur) {
-    const Rgb color = clamp01(material.uses_display_color ? display_color : eval_color(material.diffuse_color, st));
-    alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.roughness, st), blur));
+StandardBsdf::StandardBsdf(const StandardMaterial& material, const TexturePoint& at, const Rgb& display_color,
+                           float blur) {
+    const Rgb color = clamp01(material.uses_display_color ? display_color : eval_color(material.diffuse_color, at));
+    alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.roughness, at), blur));
     if (material.use_specular_workflow) {
         diffuse_ = color;
-        f0_ = clamp01(eval_color(material.specular_color, st));
+        f0_ = clamp01(eval_color(material.specular_color, at));
     } else {
-        const float metallic = std::clamp(eval_float(material.metallic, st), 0.0f, 1.0f);
+        const float metallic = std::clamp(eval_float(material.metallic, at), 0.0f, 1.0f);
         diffuse_ = color * (1.0f - metallic);
         f0_ = Rgb(fresnel_f0(material.ior)) * (1.0f - metallic) + color * metallic;
     }
-    clearcoat_ = std::clamp(eval_float(material.clearcoat, st), 0.0f, 1.0f);
-    clearcoat_alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.clearcoat_roughness, st), blur));
+    clearcoat_ = std::clamp(eval_float(material.clearcoat, at), 0.0f, 1.0f);
+    clearcoat_alpha_ = alpha_from_roughness(blurred_roughness(eval_float(material.clearcoat_roughness, at), blur));
     clearcoat_f0_ = fresnel_f0(material.ior);
-    emission_ = eval_color(material.emissive_color, st);
-    opacity_ = std::clamp(eval_float(material.opacity, st), 0.0f, 1.0f);
+    emission_ = eval_color(material.emissive_color, at);
+    opacity_ = std::clamp(eval_float(material.opacity, at), 0.0f, 1.0f);
     if (material.opacity_threshold > 0.0f) opacity_ = opacity_ >= material.opacity_threshold ? 1.0f : 0.0f;
 
     const GgxAlbedo& tables = ggx_albedo();

@@ -4,7 +4,7 @@
 //   without clearcoat reflects all it receives.
 // Units: roughness is the user's (alpha = roughness²).
 // Valid: the ranges of the specification; values outside are clamped to them.
-// Not: refraction, displacement, occlusion.
+// Not: refraction, occlusion.
 #pragma once
 
 #include "frazil/material/texture.h"
@@ -24,7 +24,8 @@ struct StandardMaterial {
     MaterialInput<float> opacity{1.0f, {}};
     float opacity_threshold = 0.0f;
     float ior = 1.5f;
-    TextureLookup normal;  // tangent-space normal map, scale and bias as authored (usually 2 and -1)
+    TextureLookup normal;                 // tangent-space normal map, scale and bias as authored (usually 2 and -1)
+    MaterialInput<float> bump{0.0f, {}};  // height, metres; a texture
 };
 
 // f_r * cos(wi), in the two parts that become AOVs; specular holds the clearcoat.
@@ -43,7 +44,7 @@ class StandardBsdf {
   public:
     // `display_color` replaces the diffuse colour where the material asks for it.
     // `blur` is an alpha that makes the glossy lobes broader.
-    StandardBsdf(const StandardMaterial& material, const V2f& st, const Rgb& display_color = Rgb(0.18f),
+    StandardBsdf(const StandardMaterial& material, const TexturePoint& at, const Rgb& display_color = Rgb(0.18f),
                  float blur = 0.0f);
 
     // Both zero unless wo and wi lie above the surface.

@@ -1,6 +1,7 @@
 #include "frazil/points/cells.h"
 
 #include <algorithm>
+#include <atomic>
 #include <span>
 
 #include "frazil/base/error.h"
@@ -19,6 +20,7 @@ constexpr float kLongestEdge = 0.7f, kLongestCoarseEdge = 16.0f;
 constexpr float kLongestPerRoot = 0.75f;
 constexpr std::size_t kPiecesPerCell = 16;  // or a few less
 constexpr std::size_t kPiecesPerChunk = 512;
+constexpr double kMostStretch = 16.0;
 
 // A piece of a triangle: its corners' barycentrics.
 struct Piece {
@@ -167,8 +169,10 @@ void add_places(const Piece& piece, std::uint32_t owner, float area, int count, 
     places.push_back({owner, area / w, {piece.triangle, piece.uv[0] + e1 * u + e2 * v, area}});
 }
 
-void fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& lookup, std::span<const Piece> pieces,
+// Whether all of the pieces lie near a point.
+bool fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& lookup, std::span<const Piece> pieces,
                 std::size_t most_places, std::uint32_t seed, Chunk& chunk) {
+    bool is_covered = true;
     const double longest = kLongestEdge * points.spacing;
     int places_per_piece = 1;
     while (2 * places_per_piece * kPiecesPerCell <= most_places) places_per_piece *= 2;
@@ -184,9 +188,8 @@ void fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& loo
             const V3d middle = (p[0] + p[1] + p[2]) / 3.0;
             const std::uint32_t owner = lookup.nearest(V3f(middle), normal);
             if (owner == PointLookup::kNone) {
-                throw ValueError(str("Cells: points must cover the mesh within their spacing (", points.spacing,
-                                     "), got none near triangle ", piece.triangle,
-                                     ". Make them with poisson_points on this very mesh."));
+                is_covered = false;
+                return true;
             }
             const V2f e1 = piece.uv[1] - piece.uv[0], e2 = piece.uv[2] - piece.uv[0];
             const double area = triangle_area * std::abs(double(e1.x) * e2.y - double(e1.y) * e2.x);
@@ -209,6 +212,7 @@ void fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& loo
     }
     // What has no chance to be kept need not wait for the other chunks.
     if (chunk.places.size() > 2 * most_places * chunk.sums.size()) keep_first(chunk.places, most_places + 1);
+    return is_covered;
 }
 
 }  // namespace
@@ -236,16 +240,30 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
     cells.first.assign(n + 1, 0);
     if (n == 0) return cells;
 
-    const PointLookup lookup(points);
     const std::vector<Piece> pieces = coarse_pieces(mesh, kLongestCoarseEdge * points.spacing);
     std::vector<Chunk> chunks((pieces.size() + kPiecesPerChunk - 1) / kPiecesPerChunk);
-    parallel_for(chunks.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::size_t first = i * kPiecesPerChunk, last = std::min(pieces.size(), first + kPiecesPerChunk);
-            fill_chunk(points, mesh, lookup, std::span(pieces).subspan(first, last - first),
-                       static_cast<std::size_t>(most_places), seed, chunks[i]);
+    // Points that moved with a mesh that stretched are farther apart than their spacing says: then look farther.
+    std::atomic<bool> is_covered{false};
+    PointSet looked_at = points;
+    for (double stretch = 1.0; !is_covered; stretch *= 2.0) {
+        if (stretch > kMostStretch) {
+            throw ValueError(str("Cells: points must cover the mesh within their spacing (", points.spacing,
+                                 "), got surface far from all. Make them with poisson_points on this very mesh."));
         }
-    });
+        is_covered = true;
+        looked_at.spacing = stretch * points.spacing;
+        const PointLookup lookup(looked_at);
+        parallel_for(chunks.size(), 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end && is_covered; ++i) {
+                const std::size_t first = i * kPiecesPerChunk, last = std::min(pieces.size(), first + kPiecesPerChunk);
+                chunks[i] = {};
+                if (!fill_chunk(points, mesh, lookup, std::span(pieces).subspan(first, last - first),
+                                static_cast<std::size_t>(most_places), seed, chunks[i])) {
+                    is_covered = false;
+                }
+            }
+        });
+    }
 
     // Chunk after chunk, so that nothing depends on threads.
     std::vector<CellSums> sums(n);

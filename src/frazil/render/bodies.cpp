@@ -27,7 +27,8 @@ float Body::transmittance_average(float roughness) const {
 
 Rgb Body::inner_radiance_per_exitance(const Surface& surface) const {
     const float average = transmittance_average(surface.covering.roughness);
-    return eval_color(material->tint, surface.st) * surface.covering.tint * (material->translucency * kInvPi / average);
+    return eval_color(material->tint, surface.texture_point) * surface.covering.tint *
+           (material->translucency * kInvPi / average);
 }
 
 Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {

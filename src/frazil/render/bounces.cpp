@@ -55,7 +55,7 @@ Rgb diffuse_albedo(const SurfaceResolver& resolver, const BounceHit& hit) {
     if (!standard) return Rgb(0.0f);
     const float cosine = std::clamp(-surface.normal.dot(hit.direction), 0.0f, 1.0f);
     const V3f wo(std::sqrt(1.0f - cosine * cosine), 0.0f, cosine);
-    return StandardBsdf(*standard, surface.st, surface.display_color).albedo(wo).diffuse;
+    return StandardBsdf(*standard, surface.texture_point, surface.display_color).albedo(wo).diffuse;
 }
 
 }  // namespace

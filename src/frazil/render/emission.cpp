@@ -1,5 +1,7 @@
 #include "frazil/render/emission.h"
 
+#include <tuple>
+
 namespace frazil {
 namespace {
 
@@ -31,8 +33,22 @@ std::vector<Rgb> triangle_emission(const Scene& scene, std::uint32_t object) {
     constexpr float kMiddleWeight = 0.225f, kNearWeight = 0.12593918f, kFarWeight = 0.13239415f;
     for (std::uint32_t i = 0; i < result.size(); ++i) {
         const auto emission = [&](float u, float v) {
-            const V2f st = mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, i, {u, v});
-            return eval_color(material->emissive_color, st);
+            TexturePoint at = mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, i, {u, v});
+            const V3i& t = mesh.triangles[i];
+            const V3f &a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
+            at.position = a + e1 * u + e2 * v;
+            at.normal = e1.cross(e2).normalized();
+            at.has_st = !mesh.uvs.is_empty();
+            if (at.has_st) {
+                const V2f st0 = mesh.uvs.at(mesh.triangles, i, {0.0f, 0.0f});
+                at.set_gradients(e1, e2, mesh.uvs.at(mesh.triangles, i, {1.0f, 0.0f}) - st0,
+                                 mesh.uvs.at(mesh.triangles, i, {0.0f, 1.0f}) - st0);
+            }
+            // Each of the seven places stands for a disc of its share.
+            const float radius = std::sqrt(0.5f * e1.cross(e2).length() * kInvPi / 7.0f);
+            std::tie(at.long_axis, at.short_axis) = tangent_frame(at.normal);
+            at.long_axis *= radius, at.short_axis *= radius;
+            return eval_color(material->emissive_color, at);
         };
         if (!material->emissive_color.lookup.texture) {
             result[i] = material->emissive_color.value;

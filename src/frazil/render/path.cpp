@@ -192,7 +192,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     value.scale(Rgb(1.0f / (value.pdf * odds)));
     path.add_blur(luminance(value.diffuse) > luminance(value.specular) ? kDiffuseBlur : shader.alpha());
     path.scatter(value, surface.object);
-    path.receive(surface, surface.geometric_normal, LightUse::surface);
+    path.receive(surface, surface.horizon, LightUse::surface);
     ++path.scattered;
     path.is_delta = false;
     path.has_direct_light = path.sees_lamps = true;
@@ -208,7 +208,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
             return false;
         }
     }
-    path.leave_from(surface.position, surface.geometric_normal, wi);
+    path.leave_from(surface.lifted, surface.geometric_normal, wi);
     if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
         path.begin_piece(core_at(surface, filled), bodies_[std::size_t(filled)]->material->volume);
     }

@@ -23,7 +23,7 @@ V3f on_side(const V3f& direction, const V3f& normal, float sign) {
 float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
     const float roughness = surface.covering.roughness;
     if (ice.refraction_roughness < 0.0f) return alpha_from_roughness(roughness);
-    const float bare = eval_float(ice.roughness, surface.st);
+    const float bare = surface.covering.bare_roughness;
     return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
 }
 

@@ -85,7 +85,7 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
     const float u_pick = sampler.next_1d();
-    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
+    const LightReceiver receiver{surface.position, surface.horizon, surface.object};
     const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
@@ -95,9 +95,10 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     if (diffuse_lobe == Rgb(0.0f) && specular_lobe == Rgb(0.0f)) return;
 
     Ray shadow;
-    shadow.origin = offset_origin(surface.position, surface.geometric_normal);
+    shadow.origin = offset_origin(surface.lifted, surface.geometric_normal);
     shadow.direction = sample.direction;
-    shadow.t_max = sample.distance * (1.0f - 1e-4f);
+    shadow.t_max = sample.distance * (1.0f - 1e-4f) - (surface.lifted - surface.position).length();
+    if (!(shadow.t_max > 0.0f)) return;
     bool is_straight = true;
     const Rgb visible = visibility(path, sample.light, shadow, path.inside, tile, is_straight);
     if (visible == Rgb(0.0f)) return;

@@ -1,8 +1,10 @@
 // How a surface scatters light: one face over the material models.
 // Model: standard materials by StandardBsdf; ice by its boundary's glossy reflection over the diffuse one of its overlays (its
 //   core answers by gather and by refracted rays: path.h).
+//   Where a bump tilts the normal, light fades towards the smooth surface's horizon instead of being cut off [Chiang2019].
 // Units: f * cos per steradian.
-// Valid: reflection only: zero where a direction is below the geometric surface.
+// Valid: reflection only: zero where a direction is below the surface's horizon (its normal without bump). The fade only
+//   takes energy, and only where there is bump.
 #pragma once
 
 #include <optional>
@@ -50,7 +52,10 @@ class Shader {
     V3f to_local(const V3f& v) const { return {v.dot(tangent_), v.dot(bitangent_), v.dot(normal_)}; }
     V3f to_world(const V3f& v) const { return tangent_ * v.x + bitangent_ * v.y + normal_ * v.z; }
 
-    V3f geometric_normal_, normal_, tangent_, bitangent_;
+    // 1 without bump.
+    float terminator(const V3f& wi) const;
+
+    V3f horizon_, normal_, tangent_, bitangent_;
     std::optional<StandardBsdf> standard_;
     const Body* body_ = nullptr;
     // Of ice: its boundary, the core under it, and what its overlays scatter.

@@ -1,5 +1,8 @@
 #include "frazil/render/surface.h"
 
+#include <algorithm>
+#include <tuple>
+
 #include "frazil/base/parallel.h"
 
 namespace frazil {
@@ -17,27 +20,48 @@ V3f bent_towards_viewer(const V3f& normal, const V3f& wo) {
     return (normal + wo * (kLeastCosine - cosine)).normalized();
 }
 
-// The shading normal turned, in the tangent frame of st, by a normal map's value.
-V3f mapped_normal(const Surface& surface, const Object& object, const Mesh& mesh, const Hit& hit,
-                  const V3f& tangent_space_normal) {
-    // The direction in which s grows, from the triangle's three corners.
-    const V3i& t = mesh.triangles[hit.triangle];
-    const V2f st0 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 0.0f});
-    const V2f d1 = mesh.uvs.at(mesh.triangles, hit.triangle, {1.0f, 0.0f}) - st0;
-    const V2f d2 = mesh.uvs.at(mesh.triangles, hit.triangle, {0.0f, 1.0f}) - st0;
-    const float determinant = d1.x * d2.y - d1.y * d2.x;
-    if (determinant == 0.0f) return surface.normal;
-    const V3f e1 = mesh.positions[t.y] - mesh.positions[t.x];
-    const V3f e2 = mesh.positions[t.z] - mesh.positions[t.x];
-    V3f tangent;
-    object.local_to_world.multDirMatrix((e1 * d2.y - e2 * d1.y) / determinant, tangent);
-    tangent -= surface.normal * surface.normal.dot(tangent);
-    if (!(tangent.length2() > 0.0f)) return surface.normal;
-    tangent.normalize();
-    const V3f bitangent = surface.normal.cross(tangent) * (determinant < 0.0f ? -1.0f : 1.0f);
-    const V3f n =
-        tangent * tangent_space_normal.x + bitangent * tangent_space_normal.y + surface.normal * tangent_space_normal.z;
-    return n.length2() > 0.0f ? n.normalized() : surface.normal;
+// The place that the tangent planes of a triangle's corners curve over: never below the triangle [Hanika2021]. `normals`
+// are on the viewer's side.
+V3f lifted(const V3f corners[3], const V3f normals[3], const V2f& uv, const V3f& position) {
+    constexpr float kHighest = 0.25f;  // of the longest edge: what normals tell of a box is not its shape
+    const float weights[3] = {1.0f - uv.x - uv.y, uv.x, uv.y};
+    V3f sum(0.0f);
+    float longest2 = 0.0f;
+    for (int k = 0; k < 3; ++k) {
+        const V3f away = position - corners[k];
+        sum += normals[k] * (weights[k] * std::max(0.0f, -away.dot(normals[k])));
+        longest2 = std::max(longest2, (corners[(k + 1) % 3] - corners[k]).length2());
+    }
+    const float limit2 = kHighest * kHighest * longest2;
+    if (sum.length2() > limit2) sum *= std::sqrt(limit2 / sum.length2());
+    return position + sum;
+}
+
+bool has_image(const TextureLookup& lookup) {
+    return lookup.texture != nullptr;
+}
+
+bool reads_images(const StandardMaterial& m) {
+    return has_image(m.diffuse_color.lookup) || has_image(m.emissive_color.lookup) ||
+           has_image(m.specular_color.lookup) || has_image(m.metallic.lookup) || has_image(m.roughness.lookup) ||
+           has_image(m.clearcoat.lookup) || has_image(m.clearcoat_roughness.lookup) || has_image(m.opacity.lookup) ||
+           has_image(m.normal) || has_image(m.bump.lookup);
+}
+
+bool reads_images(const IceMaterial& m) {
+    return has_image(m.roughness.lookup) || has_image(m.tint.lookup) || has_image(m.normal) ||
+           has_image(m.bump.lookup) ||
+           std::any_of(m.overlays.begin(), m.overlays.end(), [](const Overlay& o) { return has_image(o.mask.lookup); });
+}
+
+// The normal that a bump or a normal map makes of at.normal, in rest space.
+V3f mapped_normal(const TextureLookup& map, const MaterialInput<float>& bump, const TexturePoint& at) {
+    V3f normal = eval_normal(map, at);
+    if (bump.lookup.texture) {
+        const V3f slope = eval_slope(bump, at);
+        normal = (normal - (slope - normal * normal.dot(slope))).normalized();
+    }
+    return normal;
 }
 
 // The rotation (and mirroring) of a matrix, its scale and shear left out: the orthogonal part of its polar decomposition by
@@ -59,14 +83,6 @@ M44f rigid_part(const M44f& matrix) {
     return m;
 }
 
-Covering covering_at(const IceMaterial& ice, const PatternPoint& place, const V2f& st, bool with_bump) {
-    const float roughness = eval_float(ice.roughness, st);
-    if (!ice.overlays.empty()) return eval_overlays(ice.overlays, ice.age, roughness, place, st, with_bump);
-    Covering bare;
-    bare.roughness = roughness;
-    return bare;
-}
-
 }  // namespace
 
 SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
@@ -75,29 +91,56 @@ SurfaceResolver::SurfaceResolver(const Scene& scene) : scene_(scene) {
         const M44f rigid = rigid_part(object.local_to_world);
         frames_.push_back({object.local_to_world.inverse(), rigid.inverse(), rigid});
     }
+    for (const Material& material : scene.materials) {
+        reads_images_.push_back(std::visit([](const auto& model) { return reads_images(model); }, material.model));
+    }
 }
 
-PatternPoint SurfaceResolver::place(std::uint32_t object, const V3f& position, const V3f& normal,
-                                    float footprint) const {
-    PatternPoint point;
-    point.position = position * world_to_rest(object);
-    world_to_rest(object).multDirMatrix(normal, point.normal);
-    point.footprint = footprint;
-    return point;
+TexturePoint SurfaceResolver::texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv,
+                                            const V3f& position, const V3f& normal) const {
+    const Mesh& mesh = scene_.meshes[scene_.objects[object].mesh];
+    TexturePoint at;
+    at.has_st = !mesh.uvs.is_empty();
+    if (at.has_st) at.st = mesh.uvs.at(mesh.triangles, triangle, uv);
+    at.position = position * world_to_rest(object);
+    world_to_rest(object).multDirMatrix(normal, at.normal);
+    if (!at.has_st || !reads_images_[scene_.objects[object].material]) return at;
+
+    // How s and t grow over the triangle, from its three corners.
+    const V3i& t = mesh.triangles[triangle];
+    const V2f st0 = mesh.uvs.at(mesh.triangles, triangle, {0.0f, 0.0f});
+    const V2f d1 = mesh.uvs.at(mesh.triangles, triangle, {1.0f, 0.0f}) - st0;
+    const V2f d2 = mesh.uvs.at(mesh.triangles, triangle, {0.0f, 1.0f}) - st0;
+    const auto edge = [&](int to) {
+        V3f world, rest;
+        scene_.objects[object].local_to_world.multDirMatrix(mesh.positions[to] - mesh.positions[t.x], world);
+        world_to_rest(object).multDirMatrix(world, rest);
+        return rest;
+    };
+    at.set_gradients(edge(t.y), edge(t.z), d1, d2);
+    return at;
+}
+
+Covering SurfaceResolver::covering(const IceMaterial& ice, const TexturePoint& at, float footprint,
+                                   bool with_bump) const {
+    const float roughness = eval_float(ice.roughness, at);
+    const PatternPoint point{at.position, at.normal, footprint};
+    return eval_overlays(ice.overlays, ice.age, roughness, point, at, with_bump);
 }
 
 std::vector<CoveringSlope> SurfaceResolver::slopes(const Surface& surface) const {
     const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
-    return ice ? covering_slopes(ice->overlays, ice->age, surface.place, surface.st) : std::vector<CoveringSlope>();
+    return ice ? covering_slopes(ice->overlays, ice->age, surface.place, surface.texture_point)
+               : std::vector<CoveringSlope>();
 }
 
 std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, const PointSet& points) const {
     const auto& ice = std::get<IceMaterial>(scene_.materials[scene_.objects[object].material].model);
     const std::size_t overlays = ice.overlays.size();
     std::vector<float> result(points.size() * overlays);
-    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const V2f& st) {
-        const std::vector<CoveringSlope> slopes = covering_slopes(ice.overlays, ice.age, at, st);
-        const float scattered = eval_overlays(ice.overlays, ice.age, 0.0f, at, st, false).scattered;
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
+        const std::vector<CoveringSlope> slopes = covering_slopes(ice.overlays, ice.age, at, texture_at);
+        const float scattered = eval_overlays(ice.overlays, ice.age, 0.0f, at, texture_at, false).scattered;
         for (std::size_t o = 0; o < overlays; ++o) {
             result[k * overlays + o] = scattered < 1.0f ? slopes[o].scattered / (1.0f - scattered) : 0.0f;
         }
@@ -107,15 +150,16 @@ std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, cons
 
 template <class Visit>
 void SurfaceResolver::for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const {
-    const Mesh& mesh = scene_.meshes[scene_.objects[object].mesh];
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto triangle = static_cast<std::uint32_t>(points.triangles[k]);
-            const V2f st =
-                mesh.uvs.is_empty() ? V2f(0.0f) : mesh.uvs.at(mesh.triangles, triangle, points.barycentrics[k]);
+            TexturePoint at =
+                texture_point(object, triangle, points.barycentrics[k], points.positions[k], points.normals[k]);
             // A point stands for a disc of its area.
             const float footprint = std::sqrt(points.areas[k] * kInvPi);
-            visit(k, place(object, points.positions[k], points.normals[k], footprint), st);
+            std::tie(at.long_axis, at.short_axis) = tangent_frame(at.normal);
+            at.long_axis *= footprint, at.short_axis *= footprint;
+            visit(k, PatternPoint{at.position, at.normal, footprint}, at);
         }
     });
 }
@@ -124,8 +168,8 @@ std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSe
     const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
     if (!ice || ice->overlays.empty()) return {};
     std::vector<float> result(points.size());
-    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const V2f& st) {
-        result[k] = 1.0f - eval_overlays(ice->overlays, ice->age, 0.0f, at, st, false).scattered;
+    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
+        result[k] = 1.0f - eval_overlays(ice->overlays, ice->age, 0.0f, at, texture_at, false).scattered;
     });
     return result;
 }
@@ -145,37 +189,69 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     };
     const V3f local = at_hit(mesh.positions);
     surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest);
-    surface.position = local * object.local_to_world;
+    surface.position = surface.lifted = local * object.local_to_world;
 
     const V3f wo = -direction;
     surface.geometric_normal = towards(hit.geometric_normal, wo);
     surface.normal = surface.geometric_normal;
     if (!mesh.normals.is_empty()) {
-        const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv),
-                                            frames_[hit.placement].world_to_local);
+        const M44f& world_to_local = frames_[hit.placement].world_to_local;
+        const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local);
         if (is_finite(normal) && normal.length2() > 0.0f) {
             surface.normal = bent_towards_viewer(towards(normal, surface.geometric_normal), wo);
+            V3f corners[3], normals[3];
+            for (int k = 0; k < 3; ++k) {
+                corners[k] = mesh.positions[triangle[k]] * object.local_to_world;
+                const V2f corner(k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f);
+                normals[k] =
+                    towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
+                            surface.geometric_normal);
+            }
+            const V3f place = lifted(corners, normals, hit.uv, surface.position);
+            if (is_finite(place)) surface.lifted = place;
         }
     }
+    surface.horizon = surface.normal;
     if (!mesh.uvs.is_empty()) surface.st = mesh.uvs.at(mesh.triangles, hit.triangle, hit.uv);
     if (!mesh.colors.is_empty()) surface.display_color = mesh.colors.at(mesh.triangles, hit.triangle, hit.uv);
-    const auto* standard = std::get_if<StandardMaterial>(&surface.material->model);
-    if (standard && standard->normal.texture && !mesh.uvs.is_empty()) {
-        const V3f mapped = mapped_normal(surface, object, mesh, hit, eval_normal(standard->normal, surface.st));
-        surface.normal = bent_towards_viewer(mapped, wo);
+
+    const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
+    const bool has_images = reads_images_[object.material];
+    if (!has_images && !(ice && !ice->overlays.empty())) {
+        surface.texture_point.st = surface.st;
+        if (ice) surface.covering = covering(*ice, surface.texture_point, footprint, false);
+        return surface;
     }
-    if (const auto* ice = std::get_if<IceMaterial>(&surface.material->model)) {
-        // Patterns see the surface from outside, whichever side the viewer is on.
-        const V3f outside = surface.normal * (hit.geometric_normal.dot(surface.geometric_normal) < 0.0f ? -1.0f : 1.0f);
-        surface.place = place(hit.placement, surface.position, outside, footprint);
-        surface.covering = covering_at(*ice, surface.place, surface.st, with_bump);
-        if (surface.covering.slope != V3f(0.0f)) {
-            V3f slope;
-            rest_to_world(hit.placement).multDirMatrix(surface.covering.slope, slope);
-            slope -= outside * outside.dot(slope);
-            const V3f tilted = towards((outside - slope).normalized(), surface.geometric_normal);
-            surface.normal = bent_towards_viewer(tilted, wo);
-        }
+    // Patterns and images see the surface from outside, whichever side the viewer is on.
+    const float side = hit.geometric_normal.dot(surface.geometric_normal) < 0.0f ? -1.0f : 1.0f;
+    TexturePoint& at = surface.texture_point;
+    at = texture_point(hit.placement, hit.triangle, hit.uv, surface.position, surface.normal * side);
+    if (footprint > 0.0f && has_images) {
+        // The cone's circle, drawn out where the surface is seen aslant.
+        const V3f& n = surface.geometric_normal;
+        const float cosine = std::clamp(n.dot(wo), 1e-3f, 1.0f);
+        V3f slant = wo - n * n.dot(wo);
+        slant = slant.length2() > 1e-8f ? slant.normalized() : tangent_frame(n).first;
+        world_to_rest(hit.placement).multDirMatrix(slant * (footprint / cosine), at.long_axis);
+        world_to_rest(hit.placement).multDirMatrix(n.cross(slant) * footprint, at.short_axis);
+    }
+    V3f mapped = at.normal;
+    if (with_bump && has_images) {
+        const auto* standard = std::get_if<StandardMaterial>(&surface.material->model);
+        mapped = ice ? mapped_normal(ice->normal, ice->bump, at) : mapped_normal(standard->normal, standard->bump, at);
+    }
+    if (ice) {
+        surface.place = {at.position, at.normal, footprint};
+        surface.covering = covering(*ice, at, footprint, with_bump);
+        const V3f& slope = surface.covering.slope;
+        if (slope != V3f(0.0f)) mapped = (mapped - (slope - mapped * mapped.dot(slope))).normalized();
+    }
+    if (mapped != at.normal) {
+        V3f normal;
+        rest_to_world(hit.placement).multDirMatrix(mapped * side, normal);
+        if (normal.dot(surface.geometric_normal) <= 0.0f)
+            normal -= surface.geometric_normal * (normal.dot(surface.geometric_normal) - 1e-3f);
+        surface.normal = bent_towards_viewer(normal.normalized(), wo);
     }
     return surface;
 }

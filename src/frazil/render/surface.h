@@ -1,14 +1,16 @@
 // What a ray has hit: the place, its normals and its texture coordinates, ready for shading.
 // Model: two-sided: the normals turn towards the viewer. The shading normal is bent until the viewer is above it. Patterns
 //   are read in rest space: the object's own frame under its scale, without its rotation and place, so that their widths
-//   are metres and they stay with a moving object.
+//   are metres and they stay with a moving object. Textures see the ellipse that the ray's cone cuts out of the surface.
+//   Light is not cut off by the facets of a smooth mesh: `horizon` is the smooth normal's, and rays leave from `lifted`,
+//   the place on the curved surface that the vertices' normals tell [Hanika2021].
 // Units: metres, world space.
-// Not: derivatives of texture coordinates (textures are read without a footprint).
 #pragma once
 
 #include <vector>
 
 #include "frazil/geometry/ray_scene.h"
+#include "frazil/material/texture.h"
 #include "frazil/points/point_set.h"
 #include "frazil/render/scene.h"
 
@@ -20,7 +22,10 @@ struct Surface {
     V3f position = V3f(0.0f);
     V3f geometric_normal = V3f(0.0f);  // unit length, on the viewer's side
     V3f normal = V3f(0.0f);            // for shading, unit length, the viewer above it
+    V3f horizon = V3f(0.0f);           // the same without bump and normal map
+    V3f lifted = V3f(0.0f);            // where rays leave on the viewer's side
     V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
+    TexturePoint texture_point;        // where textures are read; st alone for materials that read none
     V3f local_position = V3f(0.0f);    // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
     Covering covering;   // of ice: its overlays, with the roughness that they leave
@@ -32,8 +37,8 @@ class SurfaceResolver {
   public:
     explicit SurfaceResolver(const Scene& scene);
 
-    // `direction` is the ray's, towards the surface; `footprint` the radius of what the ray stands for, metres. Bump is left
-    // out where the surface only lets light pass.
+    // `direction` is the ray's, towards the surface; `footprint` the radius of what the ray stands for, metres. Bump and
+    // normal map are left out where the surface only lets light pass.
     Surface resolve(const Hit& hit, const V3f& direction, float footprint = 0.0f, bool with_bump = false) const;
 
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
@@ -52,12 +57,16 @@ class SurfaceResolver {
     struct Frames {
         M44f world_to_local, world_to_rest, rest_to_world;
     };
-    PatternPoint place(std::uint32_t object, const V3f& position, const V3f& normal, float footprint) const;
+    Covering covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump) const;
+    // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
+    TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,
+                               const V3f& normal) const;
     template <class Visit>
     void for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const;
 
     const Scene& scene_;
     std::vector<Frames> frames_;
+    std::vector<std::uint8_t> reads_images_;  // per material
 };
 
 }  // namespace frazil
