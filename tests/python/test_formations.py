@@ -215,3 +215,26 @@ def test_docs_list_every_formation_and_parameter():
 
     text = (Path(__file__).parents[2] / "docs/formations.md").read_text()
     assert formations_markdown(FORMATIONS) in text
+
+
+def test_a_field_shares_meshes_and_bakes_light_for_each_instance(tmp_path):
+    from frazil.formations.field import ice_field, write_field
+
+    field = ice_field(count=12, prototypes=2, seed=1, triangles=kSmall, spacing=0.5)
+    path = tmp_path / "field.usdc"
+    write_field(field, path)
+    stage = Usd.Stage.Open(str(path))
+    instances = [prim for prim in stage.GetPrimAtPath("/World/Field").GetChildren() if prim.IsInstance()]
+    assert len(instances) == 12
+    assert len(stage.GetPrototypes()) == len(set(field.which.tolist()))
+
+    scene = fz.load_usd(path)
+    assert list(scene.warnings) == []
+    assert len(scene.objects) == 13
+    assert len(scene.mesh_paths) == len(stage.GetPrototypes()) + 1
+    film = fz.render(scene, resolution=(16, 9), samples=1, bake_samples=1, max_bounces=0, bake_bounces=0)
+    assert film["translucency"].max() > 0.0
+    # No instance stands within another.
+    x, z = field.places[:, 0], field.places[:, 1]
+    apart = np.hypot(x[:, None] - x, z[:, None] - z) + 1e9 * np.eye(12)
+    assert apart.min() > 1.5

@@ -13,8 +13,13 @@ from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Any
 
+from .breath import breath_burst
 from .cathedral import cathedral
 from .formation import CameraRow, Formation, LightRow, MaterialRow, Part
+from .glacier_front import glacier_front
+from .iceberg import iceberg
+from .icicles import icicles
+from .pack_ice import pack_ice
 from .spires import ice_tips, spire_cluster
 from .usd import write_formation
 
@@ -25,14 +30,22 @@ __all__ = [
     "LightRow",
     "MaterialRow",
     "Part",
+    "breath_burst",
     "cathedral",
+    "glacier_front",
     "ice_tips",
+    "iceberg",
+    "icicles",
     "make_formation",
+    "pack_ice",
     "spire_cluster",
     "write_formation",
 ]
 
-FORMATIONS: dict[str, Callable[..., Formation]] = {f.__name__: f for f in (spire_cluster, ice_tips, cathedral)}
+FORMATIONS: dict[str, Callable[..., Formation]] = {
+    made.__name__: made
+    for made in (spire_cluster, ice_tips, cathedral, iceberg, glacier_front, breath_burst, icicles, pack_ice)
+}
 
 
 def make_formation(name: str, **parameters: Any) -> Formation:

@@ -15,6 +15,7 @@ from .formation import CameraRow, Formation, Part, check_count, check_parameters
 from .noise import Noise, swirl
 from .randomness import generator
 from .solids import block, kUp, shard, solid_of, union
+from .spires import keep_tips
 from .surroundings import ice, kRock, rock_part, sky_and_lights
 from .weathering import Melt, Progress, grow
 
@@ -85,7 +86,7 @@ def cathedral(
         rounding=0.10 + 0.25 * age**1.5,
         large=melt.large,
         fine=melt.fine,
-        keep=lambda p: _keep(p, tips),
+        keep=lambda p: keep_tips(p, tips, 0.8),
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice", 50.0)]
@@ -266,10 +267,3 @@ def _rocks(rng: np.random.Generator, hall: _Hall, count: int, seed: int) -> list
 def _blend(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
     h = np.maximum(width - np.abs(a - b), 0.0) / width
     return np.minimum(a, b) - h * h * width * 0.25
-
-
-def _keep(p: np.ndarray, tips: np.ndarray) -> np.ndarray:
-    from scipy.spatial import cKDTree
-
-    distance, _ = cKDTree(tips).query(p, distance_upper_bound=0.8)
-    return np.clip(np.minimum(distance, 0.8) / 0.8, 0.06, 1.0)

@@ -127,7 +127,7 @@ def shard(
     arch = 4.0 * s * rest
     spine = base + s[:, None] * (tip - base) + arch[:, None] * (bulge[0] * side + bulge[1] * other)
     p = spine + x[..., None] * side - z[..., None] * other
-    solid = _swept(p, base, tip)
+    solid = swept(p, base, tip)
 
     # Planes where slivers have come off: across a ridge, steeply.
     for _ in range(shaves):
@@ -137,8 +137,12 @@ def shard(
         normal = out + rng.uniform(-0.4, 0.6) * radius / length * axis
         normal /= np.linalg.norm(normal)
         through = base + at * (tip - base) + 4 * at * (1 - at) * (bulge[0] * side + bulge[1] * other)
-        through = through + out * radius * (1 - at) ** exponent * flat * rng.uniform(0.5, 0.75)
+        # How far a blade reaches in that direction: its broad side is `spin` around the axis.
+        reach = np.hypot(np.cos(turn_at + spin), flat * np.sin(turn_at + spin))
+        through = through + out * radius * (1 - at) ** exponent * reach * rng.uniform(0.5, 0.75)
         solid = solid.trim_by_plane(-normal, -float(normal @ through))
+    # A plane may cut a bent shard twice: what hangs in the air goes.
+    solid = max(solid.decompose(), key=lambda piece: piece.volume(), default=solid)
     if is_broken:
         turn_at = rng.uniform(0, 2 * np.pi)
         normal = axis * rng.uniform(0.6, 1.1) + np.cos(turn_at) * side + np.sin(turn_at) * other
@@ -173,8 +177,8 @@ def boulder(rng: np.random.Generator, center, size) -> Manifold:
     return solid.scale(tuple(size)).rotate(tuple(rng.uniform(-40, 40, 3))).translate(tuple(center))
 
 
-def _swept(p: np.ndarray, base: np.ndarray, tip: np.ndarray) -> Manifold:
-    # Columns (C, S, 3) around the axis, closed by a fan at the base and one at the tip.
+def swept(p: np.ndarray, base: np.ndarray, tip: np.ndarray) -> Manifold:
+    """The solid between columns (C, S, 3) of points around an axis, closed by a fan at the base and one at the tip."""
     columns, rows, _ = p.shape
     index = np.arange(columns * rows).reshape(columns, rows)
     a, b = index, np.roll(index, -1, 0)

@@ -4,6 +4,7 @@ Units: metres, y up; made at a height of 4 m (spires) and 1 m (tips), then scale
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .formation import CameraRow, Formation, check_count, check_parameters, check_within, triangle_budget
 from .noise import Noise, swirl
@@ -76,7 +77,7 @@ def spire_cluster(
         rounding=0.10 * age**1.5,
         large=melt.large,
         fine=melt.fine,
-        keep=lambda p: _keep(p, tips),
+        keep=lambda p: keep_tips(p, tips),
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice")]
@@ -173,7 +174,7 @@ def ice_tips(
         rounding=0.02 * age**1.5,
         large=melt.large,
         fine=melt.fine,
-        keep=lambda p: _keep(p, points, 0.16),
+        keep=lambda p: keep_tips(p, points, 0.16),
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 0.5, budget, -0.10)]
@@ -231,9 +232,7 @@ def _cluster(rng: np.random.Generator, count: int, lean: float, step: float):
     return solids, np.array(tips)
 
 
-def _keep(points: np.ndarray, tips: np.ndarray, reach: float = 0.55) -> np.ndarray:
-    # Tips stay as they are; everything takes its full share `reach` metres below.
-    from scipy.spatial import cKDTree
-
+def keep_tips(points: np.ndarray, tips: np.ndarray, reach: float = 0.55) -> np.ndarray:
+    """How much (N,) of wear a place takes: little at tips (K, 3), all of it `reach` metres from them."""
     distance, _ = cKDTree(tips).query(points, distance_upper_bound=reach)
     return np.clip(np.minimum(distance, reach) / reach, 0.05, 1.0)

@@ -4,14 +4,16 @@ Units: metres, y up.
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from .contour import Surface
+from .contour import Surface, corner_normals
 from .formation import LightRow, MaterialRow, Part
 from .noise import Noise, swirl
 from .sky import make_sky
 from .solids import boulder, kUp
 from .weathering import grow
 
+kDeep, kShallow = np.array([0.010, 0.030, 0.042]), np.array([0.07, 0.30, 0.33])
 kSnow = MaterialRow("UsdPreviewSurface", {"diffuseColor": (0.84, 0.88, 0.93), "roughness": 0.7, "ior": 1.31})
 kRock = MaterialRow("UsdPreviewSurface", {"roughness": 0.45, "ior": 1.5}, uses_colors=True)
 kWater = MaterialRow("UsdPreviewSurface", {"roughness": 0.08, "ior": 1.33}, uses_colors=True)
@@ -78,3 +80,32 @@ def snowfield(seed: int, size: float, budget: int, level: float = 0.0, extent: f
         return level + size * h + (0.0 if lift is None else lift(p))
 
     return Part.of("Snowfield", sheet(height, extent * size, count), "Snow", "snow", 80.0, is_sheet=True)
+
+
+def water(seed: int, size: float, budget: int, ice: Surface, extent: float, reach: float) -> Part:
+    """The sea at y = 0 with waves of `size` metres, turquoise over ice that lies within `reach` metres below."""
+    noise = Noise(seed + 3000)
+    count = int(np.sqrt(min(0.25 * budget, 160_000) / 8.0))
+    span = 1.3 * float(np.abs(ice.positions[:, [0, 2]]).max())
+
+    def height(p: np.ndarray) -> np.ndarray:
+        wave = noise(p * [1.0, 1.0, 1.8], size, 1) + 0.45 * noise(p * [1.3, 1.0, 2.2], 0.37 * size, 2)
+        return 0.008 * size * wave
+
+    surface = sheet(height, extent * span / 3.0, count, min(1.0, 4.5 / extent))
+    below = ice.positions[ice.positions[:, 1] < 0.0]
+    p = surface.positions
+    # The upper hull of what lies below is what shows through.
+    distance, _ = cKDTree(below[:, [0, 2]]).query(p[:, [0, 2]], distance_upper_bound=2.0 * reach)
+    near = np.exp(-((np.minimum(distance, 2.0 * reach) / reach) ** 2) * 2.0)[:, None]
+    color = kDeep * (1.0 - near) + kShallow * near
+    return Part(
+        "Water",
+        p.astype(np.float32),
+        surface.triangles.astype(np.int32),
+        "Water",
+        "water",
+        corner_normals(surface, 80.0).astype(np.float32),
+        colors=color.astype(np.float32),
+        is_sheet=True,
+    )

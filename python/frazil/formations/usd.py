@@ -6,6 +6,7 @@ Not: reading; see frazil.usd.
 """
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,14 +33,19 @@ def write_formation(formation: Formation, path: str | Path) -> None:
     """
     path = Path(path)
     check_suffix(path)
-    sky = path.with_name(f"{path.stem}_sky.exr")
-    if formation.sky is not None:
-        with replacing(sky) as temporary, tempfile.TemporaryDirectory(dir=path.resolve().parent) as folder:
-            whole = Path(folder) / sky.name
-            write_image(whole, formation.sky)
+    write_stage(path, lambda stage, sky: add_formation(stage, formation, sky), formation.sky)
+
+
+def write_stage(path: Path, fill: Callable[[Usd.Stage, str], object], sky: np.ndarray | None) -> None:
+    """Write what `fill` puts into an empty stage, told where the sky lies, and the sky beside it."""
+    sky_path = path.with_name(f"{path.stem}_sky.exr")
+    if sky is not None:
+        with replacing(sky_path) as temporary, tempfile.TemporaryDirectory(dir=path.resolve().parent) as folder:
+            whole = Path(folder) / sky_path.name
+            write_image(whole, sky)
             whole.replace(temporary)
     stage = Usd.Stage.CreateInMemory()
-    add_formation(stage, formation, f"./{sky.name}")
+    fill(stage, f"./{sky_path.name}")
     export(stage, path)
 
 
