@@ -7,8 +7,6 @@
 
 #include <cstdint>
 
-#include "frazil/points/fragment.h"
-
 namespace frazil {
 
 inline constexpr double kPointsPerSpacing2 = 0.7;

@@ -8,7 +8,6 @@
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/random.h"
-#include "frazil/points/nearest_areas.h"
 #include "frazil/points/point_budget.h"
 #include "frazil/points/tile_filler.h"
 #include "frazil/points/tile_grid.h"
@@ -16,8 +15,9 @@
 namespace frazil {
 namespace {
 
-constexpr double kTileWidth =
-    12.0;  // in spacings: wide enough that few points lie at a border, small enough to share out
+// In spacings: wide enough that few points lie at a border, small enough to share out and to stay in the cache.
+constexpr double kTileWidth = 32.0;
+constexpr double kLeastTileWidth = 6.0;  // in the largest spacings, so that tiles of one colour stay apart
 constexpr std::size_t kTriangleGrain = 4096;
 
 // The area, and the integral of 1 / spacing² over it, which tells the number of points.
@@ -47,43 +47,14 @@ Extent measure(const Mesh& mesh, const SpacingField& spacing) {
     });
 }
 
-PointSet assemble(std::vector<std::vector<Dart>>& darts, std::vector<float> areas) {
-    std::vector<std::size_t> first(darts.size() + 1, 0);
-    for (std::size_t i = 0; i < darts.size(); ++i) first[i + 1] = first[i] + darts[i].size();
-    PointSet points;
-    resize(points, first.back());
-    points.areas = std::move(areas);
-    parallel_for(darts.size(), 64, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t tile = begin; tile < end; ++tile) {
-            std::size_t at = first[tile];
-            for (const Dart& dart : darts[tile]) {
-                points.positions[at] = dart.position;
-                points.normals[at] = dart.normal;
-                points.triangles[at] = dart.triangle;
-                points.barycentrics[at++] = dart.uv;
-            }
-            std::vector<Dart>().swap(darts[tile]);
-        }
-    });
-    return points;
+std::size_t point_count(const PointsInTiles& points) {
+    std::size_t sum = 0;
+    for (const std::vector<Dart>& tile : points.darts) sum += tile.size();
+    return sum;
 }
 
-// Points in their tiles, before areas and arrays are made of them.
-struct Placed {
-    SpacingField spacing;
-    double unit;  // the reference spacing
-    TileGrid grid;
-    std::vector<std::vector<Dart>> darts;
-
-    std::size_t count() const {
-        std::size_t sum = 0;
-        for (const std::vector<Dart>& tile : darts) sum += tile.size();
-        return sum;
-    }
-};
-
-Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, const PoissonOptions& options,
-                    Progress* progress) {
+PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double largest, const PoissonOptions& options,
+                           Progress* progress) {
     const Box3f box = bounds(mesh);
     // A spacing beyond the mesh's size asks for the same points as its size does, and keeps numbers tame.
     const double diagonal = mesh.positions.empty() ? 0.0 : (V3d(box.max) - V3d(box.min)).length();
@@ -99,47 +70,57 @@ Placed place_points(const Mesh& mesh, SpacingField spacing, double largest, cons
     check_budget(kPointsPerSpacing2 * extent.spacings2, options.max_points, "spacing", asked);
 
     const double unit = spacing.per_vertex ? std::sqrt(extent.area / extent.spacings2) : spacing.constant;
-    TileGrid grid;
+    PointsInTiles points = {mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61),
+                            {},   {}};
     try {
         const double pairs = 2.0 * double(mesh.triangles.size()) + 4.0 * point_limit(options.max_points);
-        grid = make_tile_grid(mesh, std::max(kTileWidth * unit, 1.05 * largest), static_cast<std::uint64_t>(pairs));
+        const double width = std::max(kTileWidth * unit, kLeastTileWidth * largest);
+        points.grid = make_tile_grid(mesh, spacing, width, static_cast<std::uint64_t>(pairs));
     } catch (const std::length_error&) {
         throw ValueError(str("Mesh: spacing must be large enough for the mesh's long thin triangles, got ", asked,
                              ". Remove them, or use a larger spacing or max_points."));
     }
 
+    const std::size_t count = points.grid.count();
+    points.darts.resize(count);
     std::vector<std::uint32_t> colours[8];
-    for (std::size_t i = 0; i < grid.count(); ++i) colours[grid.keys[i] & 7].push_back(std::uint32_t(i));
-    std::vector<std::vector<Dart>> darts(grid.count());
-    oneapi::tbb::enumerable_thread_specific<TileFiller> fillers(mesh, spacing, options.thin_walls, options.seed);
+    for (std::size_t i = 0; i < count; ++i) colours[points.grid.colour(i)].push_back(std::uint32_t(i));
+    oneapi::tbb::enumerable_thread_specific<TileFiller> fillers([&] { return TileFiller(points); });
     std::atomic<std::size_t> done = 0;
     for (const std::vector<std::uint32_t>& tiles : colours) {
-        parallel_for(tiles.size(), 4, [&](std::size_t begin, std::size_t end) {
-            TileFiller& filler = fillers.local();
-            std::vector<const std::vector<Dart>*> around;
-            std::vector<Dart> placed;
-            for (std::size_t i = begin; i < end; ++i) {
-                const std::uint32_t tile = tiles[i];
-                around.clear();
-                for (const std::uint32_t other : grid.neighbours(tile)) around.push_back(&darts[other]);
-                placed.clear();
-                filler.fill({grid.tile_origin(tile), unit, grid.size / unit}, &grid.triangles[grid.starts[tile]],
-                            grid.starts[tile + 1] - grid.starts[tile], around, grid.keys[tile], placed);
-                darts[tile] = std::vector<Dart>(placed);
-            }
-            if (progress) progress->update("points", double(done += end - begin) / double(grid.count()));
+        parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) fillers.local().fill(tiles[i]);
+            if (progress) progress->update("points", double(done += end - begin) / double(count));
         });
     }
-    fillers.clear();
-
-    return {spacing, unit, std::move(grid), std::move(darts)};
+    done = 0;
+    parallel_for(count, 4, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) fillers.local().share_border(i);
+        if (progress) progress->update("areas", double(done += end - begin) / double(count));
+    });
+    return points;
 }
 
-PointSet finish(const Mesh& mesh, Placed& placed, double spacing, bool thin_walls, Progress* progress) {
-    std::vector<float> areas =
-        nearest_areas(mesh, placed.spacing, placed.grid, placed.unit, thin_walls, placed.darts, progress);
-    PointSet points = assemble(placed.darts, std::move(areas));
+PointSet finish(PointsInTiles& made, double spacing) {
+    std::vector<std::vector<Dart>>& darts = made.darts;
+    std::vector<std::size_t> first(darts.size() + 1, 0);
+    for (std::size_t i = 0; i < darts.size(); ++i) first[i + 1] = first[i] + darts[i].size();
+    PointSet points;
+    resize(points, first.back());
     points.spacing = spacing;
+    parallel_for(darts.size(), 8, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t tile = begin; tile < end; ++tile) {
+            std::size_t at = first[tile];
+            for (const Dart& dart : darts[tile]) {
+                points.positions[at] = dart.position;
+                points.normals[at] = dart.normal;
+                points.areas[at] = static_cast<float>(double(dart.quanta) * made.area_quantum);
+                points.triangles[at] = dart.triangle;
+                points.barycentrics[at++] = dart.uv;
+            }
+            std::vector<Dart>().swap(darts[tile]);
+        }
+    });
     return points;
 }
 
@@ -150,8 +131,8 @@ PointSet poisson_points(const Mesh& mesh, double spacing, const PoissonOptions& 
         throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", spacing, ". It is in metres."));
     }
     check_mesh(mesh, "Mesh");
-    Placed placed = place_points(mesh, {spacing, nullptr}, spacing, options, progress);
-    return finish(mesh, placed, spacing, options.thin_walls, progress);
+    PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, options, progress);
+    return finish(points, spacing);
 }
 
 PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spacing, const PoissonOptions& options,
@@ -170,8 +151,8 @@ PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spaci
         largest = std::max<double>(largest, r);
     }
     check_mesh(mesh, "Mesh");
-    Placed placed = place_points(mesh, {largest, &vertex_spacing}, largest, options, progress);
-    return finish(mesh, placed, largest, options.thin_walls, progress);
+    PointsInTiles points = place_points(mesh, {largest, &vertex_spacing}, largest, options, progress);
+    return finish(points, largest);
 }
 
 PointSet poisson_points_by_count(const Mesh& mesh, std::uint64_t count, const PoissonOptions& options,
@@ -193,10 +174,10 @@ PointSet poisson_points_by_count(const Mesh& mesh, std::uint64_t count, const Po
     std::size_t nearest = 0;
     constexpr int kMostTries = 60;
     for (int attempt = 0; attempt < kMostTries; ++attempt) {
-        Placed placed = place_points(mesh, {spacing, nullptr}, spacing, bounded, progress);
-        const std::size_t got = placed.count();
+        PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, bounded, progress);
+        const std::size_t got = point_count(points);
         const double error = std::abs(double(got) - double(count));
-        if (error <= 0.005 * double(count)) return finish(mesh, placed, spacing, options.thin_walls, progress);
+        if (error <= 0.005 * double(count)) return finish(points, spacing);
         if (nearest == 0 || error < std::abs(double(nearest) - double(count))) nearest = got;
         // Points go as 1 / spacing²; a guess outside of what is known goes to its middle.
         (got < count ? fewer : more) = spacing;

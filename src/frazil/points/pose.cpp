@@ -4,9 +4,9 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
+#include "frazil/points/exact_shares.h"
 #include "frazil/points/fixed_point_sums.h"
-#include "frazil/points/fragment.h"
-#include "frazil/points/nearest_piece.h"
+#include "frazil/points/patch.h"
 #include "frazil/points/point_kd_tree.h"
 
 namespace frazil {
@@ -42,7 +42,7 @@ class PartSharer {
             if (ab >= bc && ab >= ca) return halve(a, b, c, normal, area, halvings);
             return bc >= ca ? halve(b, c, a, normal, area, halvings) : halve(c, a, b, normal, area, halvings);
         }
-        split(a, b, c, area);
+        split(a, b, c, normal, area);
     }
 
   private:
@@ -53,30 +53,27 @@ class PartSharer {
         share(middle, b, c, normal, 0.5 * area, halvings + 1);
     }
 
-    void split(const V3d& a, const V3d& b, const V3d& c, double area) {
+    void split(const V3d& a, const V3d& b, const V3d& c, const V3f& normal, double area) {
         std::sort(found_.begin(), found_.end());
-        candidates_.clear();
+        if (found_.size() == 1) return areas_.add(found_[0], area);
+        const V3d along = (b - a).normalized(), across = V3d(normal).cross(along);
+        PlanePart part;
+        for (const V3d& corner : {a, b, c}) part.push({(corner - a).dot(along), (corner - a).dot(across), 0.0});
+        seen_.clear();
         for (const std::uint32_t p : found_) {
-            const V3d place(points_.positions[p]);
-            candidates_.push_back({{(a - place).length2(), (b - place).length2(), (c - place).length2()}});
+            const V3d d = V3d(points_.positions[p]) - a;
+            seen_.push_back({d.dot(along), d.dot(across), d.length2()});
         }
-        const int count = static_cast<int>(candidates_.size());
-        int nearest[3];
-        find_nearest(candidates_.data(), count, nearest);
-        // A region of nearest points is convex: where it has all corners it has the whole part.
-        if (nearest[0] == nearest[1] && nearest[1] == nearest[2]) return areas_.add(found_[nearest[0]], area);
-        drop_dominated(candidates_.data(), count, nearest, kept_);
         shares_.clear();
         double total = 0.0;
-        for (const int self : kept_) {
-            Piece piece;
-            clip_piece(candidates_.data(), kept_, self, piece);
-            shares_.push_back(piece_share(piece));
+        for (std::size_t i = 0; i < seen_.size(); ++i) {
+            shares_.push_back(twice_area(nearest_part(part, seen_, i)));
             total += shares_.back();
         }
-        // Points at the same distance all along share a part twice: so the total may exceed 1.
-        for (std::size_t i = 0; i < kept_.size(); ++i) {
-            if (shares_[i] > 0.0) areas_.add(found_[kept_[i]], area * shares_[i] / total);
+        // Too thin for double: the first has it.
+        if (!(total > 0.0)) return areas_.add(found_[0], area);
+        for (std::size_t i = 0; i < seen_.size(); ++i) {
+            if (shares_[i] > 0.0) areas_.add(found_[i], area * shares_[i] / total);
         }
     }
 
@@ -85,8 +82,7 @@ class PartSharer {
     bool thin_walls_;
     FixedPointSums& areas_;
     std::vector<std::uint32_t> found_;
-    std::vector<CornerDistances> candidates_;
-    std::vector<int> kept_;
+    std::vector<PlanePoint> seen_;
     std::vector<double> shares_;
 };
 

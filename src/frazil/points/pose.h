@@ -1,10 +1,10 @@
 // Points that ride on a moving mesh: same points, same ids, new places, normals and areas.
 // Model: a point is a triangle and barycentrics. Areas are shared out anew: triangles are halved until few points can be
-//   nearest to a part, and every part is split exactly among those (nearest_piece.h).
+//   nearest to a part, and every part is split exactly among those (exact_shares.h).
 // Units: metres, m².
 // Valid: any point set on any pose, however stretched or folded: nothing is assumed of how the points cover it. Areas sum
 //   to the pose's within float rounding and are the same bits for any number of threads.
-// Not: as fast as making areas beside the points (nearest_areas.h); geodesic: nearest is through the air.
+// Not: as fast as making areas beside the points (tile_filler.h); geodesic: nearest is through the air.
 #pragma once
 
 #include <vector>

@@ -3,7 +3,7 @@
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/random.h"
-#include "frazil/points/fragment.h"
+#include "frazil/points/patch.h"
 #include "frazil/points/point_kd_tree.h"
 
 namespace frazil {

@@ -2,7 +2,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
-#include "frazil/points/fragment.h"
+#include "frazil/points/patch.h"
 #include "frazil/points/point_budget.h"
 
 namespace frazil {

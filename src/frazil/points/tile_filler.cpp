@@ -1,325 +1,328 @@
 #include "frazil/points/tile_filler.h"
 
+#include <atomic>
+
 #include "frazil/base/random.h"
 #include "frazil/points/side.h"
 
 namespace frazil {
 namespace {
 
-constexpr double kLongestEdge = 1.5;       // of a fragment, in spacings
-constexpr double kUniformDarts = 3.0;      // per spacing² of surface, before fragments are taken one by one
-constexpr float kLeafEdge = 1.0f / 32.0f;  // of the spacing: below it a part is closed exactly
-constexpr float kSafe = 1.0f - 2e-5f;      // float distances err by less than this
-constexpr double kGapTolerance = 1e-9;     // of the spacing
-constexpr int kMostLanes = 32;
+constexpr double kEvenDarts = 2.0;      // per spacing² of surface, over the whole tile in random order
+constexpr int kMostMisses = 8;          // of darts into the gaps of a patch, until they are left to the shares
+constexpr int kCoarseTries = 256;       // of darts into a gap where floats are coarse
+constexpr double kGapTolerance = 1e-9;  // of the spacing
+constexpr double kCellWidth = 1.0;      // of the cells of points, beside the reach of look-ups
+constexpr float kReachSlack = 1.0f + 1e-4f;
+
+// The float that many floats above.
+float stepped(float x, int steps) {
+    for (; steps > 0; --steps) x = std::nextafter(x, HUGE_VALF);
+    for (; steps < 0; ++steps) x = std::nextafter(x, -HUGE_VALF);
+    return x;
+}
 
 }  // namespace
 
-// A part of a fragment and its squared distances to the points around it, a lane per point.
-struct TileFiller::Node {
-    alignas(32) float d[3][kMostLanes];
-    V2f place[3];    // barycentrics in the fragment
-    float edge2[3];  // squared lengths of 01, 12, 20
-    float radius[3];
-    int lanes;
-
-    bool is_covered() const {
-        const float limit[3] = {radius[0] * radius[0] * kSafe, radius[1] * radius[1] * kSafe,
-                                radius[2] * radius[2] * kSafe};
-        int covering = 0;
-        for (int i = 0; i < lanes; ++i) {
-            covering |= int(d[0][i] <= limit[0]) & int(d[1][i] <= limit[1]) & int(d[2][i] <= limit[2]);
-        }
-        return covering != 0;
+void TileFiller::begin(std::size_t tile) {
+    tile_ = tile;
+    const TileGrid& grid = points_.grid;
+    frame_ = grid.frame(tile, points_.unit);
+    around_ = grid.neighbours(tile);
+    const V3d origin = frame_.origin();
+    double farthest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        farthest = std::max(farthest, std::max(std::abs(origin[axis]), std::abs(origin[axis] + grid.size)));
     }
-
-    // Whether a place is surely within the spacing of a point.
-    bool is_near(float b1, float b2) const {
-        const float b0 = 1.0f - b1 - b2;
-        const float bend = b0 * b1 * edge2[0] + b1 * b2 * edge2[1] + b2 * b0 * edge2[2];
-        const float r = b0 * radius[0] + b1 * radius[1] + b2 * radius[2];
-        const float limit = r * r * kSafe + bend;
-        int covering = 0;
-        for (int i = 0; i < lanes; ++i) covering |= int(b0 * d[0][i] + b1 * d[1][i] + b2 * d[2][i] <= limit);
-        return covering != 0;
+    rounding_ = farthest * 0x1p-21 / points_.unit;
+    patches_.clear();
+    for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
+        append_patches(points_.mesh, points_.spacing, frame_, grid.triangles[i], patches_);
     }
-
-    // The halves at the middle of the edge that goes from corner a to b; c is the third.
-    void halve(int a, int b, int c, Node& first, Node& second) const {
-        const float ab = edge2[a], bc = edge2[b], ca = edge2[c];
-        const float quarter = 0.25f * ab, median2 = 0.5f * (bc + ca) - quarter;
-        const V2f middle = (place[a] + place[b]) * 0.5f;
-        const float middle_radius = 0.5f * (radius[a] + radius[b]);
-        // first = (a, middle, c), second = (middle, b, c)
-        first.lanes = second.lanes = lanes;
-        for (int i = 0; i < lanes; ++i) {
-            const float m = 0.5f * (d[a][i] + d[b][i]) - quarter;
-            first.d[0][i] = d[a][i];
-            first.d[1][i] = m;
-            first.d[2][i] = d[c][i];
-            second.d[0][i] = m;
-            second.d[1][i] = d[b][i];
-            second.d[2][i] = d[c][i];
-        }
-        first.place[0] = place[a];
-        first.place[1] = second.place[0] = middle;
-        second.place[1] = place[b];
-        first.place[2] = second.place[2] = place[c];
-        first.radius[0] = radius[a];
-        first.radius[1] = second.radius[0] = middle_radius;
-        second.radius[1] = radius[b];
-        first.radius[2] = second.radius[2] = radius[c];
-        first.edge2[0] = second.edge2[0] = quarter;
-        first.edge2[1] = second.edge2[2] = std::max(0.0f, median2);
-        first.edge2[2] = ca;
-        second.edge2[1] = bc;
-    }
-};
-
-float TileFiller::next_random() {
-    return to_unit_float(hash(tile_seed_, drawn_++));
 }
 
-double TileFiller::spacing_at(std::int32_t triangle, const V2f& uv) const {
-    if (!spacing_.per_vertex) return spacing_.constant;
-    const V3i& t = mesh_.triangles[triangle];
-    return spacing_.at_vertex(t.x) * (1.0 - uv.x - uv.y) + spacing_.at_vertex(t.y) * uv.x +
-           spacing_.at_vertex(t.z) * uv.y;
-}
-
-void TileFiller::fill(const TileFrame& frame, const std::int32_t* triangles, std::size_t triangle_count,
-                      const std::vector<const std::vector<Dart>*>& around, std::uint64_t key,
-                      std::vector<Dart>& darts) {
-    frame_ = frame;
-    tile_seed_ = hash(seed_, hash(std::uint32_t(key), std::uint32_t(key >> 32)));
-    drawn_ = 0;
-    darts_ = &darts;
-    fragments_.clear();
-    for (std::size_t i = 0; i < triangle_count; ++i) {
-        append_fragments(mesh_, spacing_, frame, triangles[i], kLongestEdge, fragments_);
-    }
-
+// Make the lists in which patches find the points around them.
+void TileFiller::prepare_neighbourhood() {
     float reach = 0.0f;
-    for (const Fragment& fragment : fragments_) reach = std::max(reach, fragment_reach(fragment));
-    near_.reset(frame.size, kCellWidth * reach, reach, least_cosine(thin_walls_));
-    for (const Fragment& fragment : fragments_) {
-        V3f low = fragment.corners[0], high = low;
-        for (const V3f& corner : fragment.corners) {
-            for (int axis = 0; axis < 3; ++axis) {
-                low[axis] = std::min(low[axis], corner[axis]);
-                high[axis] = std::max(high[axis], corner[axis]);
-            }
-        }
-        near_.mark(low, high);
-    }
-    for (const std::vector<Dart>* tile : around) {
-        for_each_around(frame, reach, *tile, [&](std::size_t i, const V3f& local) {
-            near_.add(local, (*tile)[i].normal, (*tile)[i].position);
-        });
-    }
+    for (const Patch& patch : patches_) reach = std::max(reach, patch.radius + patch.largest_spacing);
+    reach = reach * kReachSlack * kReachSlack + float(rounding_);
+    near_.reset(frame_.size(), kCellWidth * reach, reach);
+    entered_.clear();
+    placed_.clear();
+    states_.clear();
+    for (const Patch& patch : patches_) states_.push_back({near_.mark(patch.center), 0, 0, 0, 0});
+}
 
-    throw_darts();
-    order_.resize(fragments_.size());
+void TileFiller::enter(std::vector<Dart>& darts) {
+    for (Dart& dart : darts) {
+        const V3f local(frame_.to_local(dart.position));
+        if (near_.is_in_reach(local)) {
+            near_.add(local, dart.normal, dart.position);
+            entered_.push_back(&dart);
+        }
+    }
+}
+
+void TileFiller::fill(std::size_t tile) {
+    begin(tile);
+    prepare_neighbourhood();
+    for (const TileGrid::Neighbour& other : around_) enter(points_.darts[other.tile]);
+
+    const std::uint64_t key = points_.grid.keys[tile];
+    random_ = {(std::uint64_t(points_.seed) << 32 | hash(points_.seed, std::uint32_t(key >> 32))) ^ key};
+    random_.next();
+    order_.resize(patches_.size());
     for (std::uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;
     for (std::size_t i = order_.size(); i > 1; --i) {
-        std::swap(order_[i - 1], order_[std::size_t(std::uint64_t(hash(tile_seed_, drawn_++)) * i >> 32)]);
+        std::swap(order_[i - 1], order_[std::size_t((random_.next() >> 32) * i >> 32)]);
     }
-    for (const std::uint32_t i : order_) cover(fragments_[i]);
+    throw_evenly(kEvenDarts);
+    throw_into_gaps();
+    all_shares_.clear();
+    for (const std::uint32_t patch : order_) cover(patch);
+    for (std::size_t patch = 0; patch < patches_.size(); ++patch) share_again(patch);
+
+    // The points keep their places from here on, as others add to their areas.
+    points_.darts[tile] = std::vector<Dart>(placed_);
+    for (Dart& dart : points_.darts[tile]) entered_.push_back(&dart);
+    quanta_.assign(near_.size(), 0);
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        const PatchState& state = states_[i];
+        if (is_final(patches_[i])) add_areas(patches_[i], &all_shares_[state.first_share], state.share_count);
+    }
+    flush_areas();
 }
 
-// Throw darts uniformly over the tile's surface (by its spacing where that varies): most points come from here.
-void TileFiller::throw_darts() {
-    cumulative_.clear();
-    double total = 0.0;
-    for (const Fragment& f : fragments_) {
-        const float r = (f.radii[0] + f.radii[1] + f.radii[2]) / 3.0f;
-        total += 0.5 * (f.corners[1] - f.corners[0]).cross(f.corners[2] - f.corners[0]).length() / (r * r);
-        cumulative_.push_back(total);
+void TileFiller::share_border(std::size_t tile) {
+    begin(tile);
+    std::size_t left = 0;
+    for (const Patch& patch : patches_) {
+        if (!is_final(patch)) patches_[left++] = patch;
     }
-    // Where to begin to look for a share of the area, so that no dart searches far.
-    guide_.resize(cumulative_.size());
-    for (std::size_t i = 0, first = 0; i < guide_.size(); ++i) {
-        while (first + 1 < cumulative_.size() && cumulative_[first] <= total * double(i) / double(guide_.size()))
-            ++first;
-        guide_[i] = static_cast<std::uint32_t>(first);
+    patches_.resize(left);
+    if (left == 0) return;
+    prepare_neighbourhood();
+    enter(points_.darts[tile]);
+    for (const TileGrid::Neighbour& other : around_) enter(points_.darts[other.tile]);
+    quanta_.assign(near_.size(), 0);
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        find(i);
+        share(i);
+        add_areas(patches_[i], shares_.data(), shares_.size());
     }
-    const auto count = static_cast<std::uint64_t>(std::ceil(total * kUniformDarts));
-    for (std::uint64_t i = 0; i < count; ++i) {
-        const double at = random() * total;
-        std::size_t chosen = guide_[std::min<std::size_t>(guide_.size() - 1, std::size_t(at / total * guide_.size()))];
-        while (chosen + 1 < cumulative_.size() && cumulative_[chosen] <= at) ++chosen;
-        const Fragment& fragment = fragments_[chosen];
-        float u = random(), v = random();
-        if (u + v > 1.0f) {
-            u = 1.0f - u;
-            v = 1.0f - v;
+    flush_areas();
+}
+
+// Whether no tile that is filled later can put a point nearer to the patch than its own are.
+bool TileFiller::is_final(const Patch& patch) const {
+    const double size = frame_.size(), overhang = points_.grid.overhang / points_.unit;
+    const double reach = patch.radius + patch.largest_spacing * kReachSlack + rounding_ + overhang;
+    const int colour = points_.grid.colour(tile_);
+    for (const TileGrid::Neighbour& other : around_) {
+        if (points_.grid.colour(other.tile) < colour) continue;
+        double gap2 = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double to_wall = other.offset[axis] > 0   ? size - patch.center[axis]
+                                   : other.offset[axis] < 0 ? double(patch.center[axis])
+                                                            : 0.0;
+            gap2 += to_wall > 0.0 ? to_wall * to_wall : 0.0;
         }
-        const V3f place = fragment.corners[0] * (1.0f - u - v) + fragment.corners[1] * u + fragment.corners[2] * v;
-        const float r = fragment.radii[0] * (1.0f - u - v) + fragment.radii[1] * u + fragment.radii[2] * v;
-        if (!near_.any_near(place, fragment.normal, r * r * kSafe, [](std::uint32_t) { return true; }))
-            try_place(fragment, u, v, false);
+        if (gap2 <= reach * reach) return false;
     }
-}
-
-void TileFiller::cover(const Fragment& fragment) {
-    Node root;
-    while (!gather(fragment, root) && cover_node(fragment, root) == Outcome::placed) {
-    }
-}
-
-// Set up the root of a fragment: lanes for the points that can cover some of it. True where one covers all.
-bool TileFiller::gather(const Fragment& f, Node& root) {
-    root.lanes = 0;
-    const V3f centroid = (f.corners[0] + f.corners[1] + f.corners[2]) * (1.0f / 3.0f);
-    float limit[3];
-    for (int k = 0; k < 3; ++k) {
-        const int next = k == 2 ? 0 : k + 1;
-        root.place[k] = V2f(k == 1, k == 2);
-        root.radius[k] = f.radii[k];
-        root.edge2[k] = (f.corners[next] - f.corners[k]).length2();
-        limit[k] = f.radii[k] * f.radii[k] * kSafe;
-    }
-    const float reach = fragment_reach(f);
-    const bool is_covered = near_.any_near(centroid, f.normal, reach * reach, [&](std::uint32_t p) {
-        const V3f& place = near_.locals[p];
-        const float d0 = (f.corners[0] - place).length2(), d1 = (f.corners[1] - place).length2(),
-                    d2 = (f.corners[2] - place).length2();
-        if (d0 <= limit[0] && d1 <= limit[1] && d2 <= limit[2]) return true;
-        // More points than lanes: those left out can only make us look closer than we need.
-        if (root.lanes < kMostLanes) {
-            root.d[0][root.lanes] = d0;
-            root.d[1][root.lanes] = d1;
-            root.d[2][root.lanes] = d2;
-            ++root.lanes;
-        }
-        return false;
-    });
-    // Whole groups of lanes, so that the loops over them need no remainder.
-    while (root.lanes % 4 != 0) {
-        for (auto& corner : root.d) corner[root.lanes] = 1e30f;
-        ++root.lanes;
-    }
-    return is_covered;
-}
-
-TileFiller::Outcome TileFiller::cover_node(const Fragment& fragment, const Node& node) {
-    if (node.is_covered()) return Outcome::covered;
-
-    float u = random(), v = random();
-    if (u + v > 1.0f) {
-        u = 1.0f - u;
-        v = 1.0f - v;
-    }
-    if (!node.is_near(u, v)) {
-        const V2f place = node.place[0] * (1.0f - u - v) + node.place[1] * u + node.place[2] * v;
-        if (try_place(fragment, place.x, place.y, false)) return Outcome::placed;
-    }
-
-    const int longest = node.edge2[0] >= node.edge2[1] && node.edge2[0] >= node.edge2[2] ? 0
-                        : node.edge2[1] >= node.edge2[2]                                 ? 1
-                                                                                         : 2;
-    const float leaf = kLeafEdge * std::min(node.radius[0], std::min(node.radius[1], node.radius[2]));
-    if (node.edge2[longest] <= leaf * leaf) return close_gap(fragment, node);
-
-    Node halves[2];
-    node.halve(longest, (longest + 1) % 3, (longest + 2) % 3, halves[0], halves[1]);
-    const int first = hash(tile_seed_, drawn_++) >> 31;
-    if (cover_node(fragment, halves[first]) == Outcome::placed) return Outcome::placed;
-    return cover_node(fragment, halves[1 - first]);
-}
-
-// Share the part exactly among its nearest points; place one at the farthest corner of a share beyond the spacing.
-TileFiller::Outcome TileFiller::close_gap(const Fragment& f, const Node& node) {
-    V3d corners[3], vertices[3];
-    for (int k = 0; k < 3; ++k) vertices[k] = frame_.to_local(mesh_.positions[mesh_.triangles[f.triangle][k]]);
-    V3d centroid(0.0);
-    for (int k = 0; k < 3; ++k) {
-        const double u = node.place[k].x, v = node.place[k].y;
-        const V2d uv = f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v;
-        corners[k] = vertices[0] * (1.0 - uv.x - uv.y) + vertices[1] * uv.x + vertices[2] * uv.y;
-        centroid += corners[k] / 3.0;
-    }
-    double edge2[3], extent2 = 0.0, radius = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        edge2[k] = (corners[(k + 1) % 3] - corners[k]).length2();
-        extent2 = std::max(extent2, (corners[k] - centroid).length2());
-        radius = std::max<double>(radius, node.radius[k]);
-    }
-    const double reach = (radius + std::sqrt(extent2)) * 1.0001;
-    candidates_.clear();
-    near_.any_near(V3f(centroid), f.normal, float(reach * reach), [&](std::uint32_t p) {
-        const V3d place = frame_.to_local(near_.worlds[p]);
-        candidates_.push_back(
-            {{(corners[0] - place).length2(), (corners[1] - place).length2(), (corners[2] - place).length2()}});
-        return false;
-    });
-
-    double worst = kGapTolerance;
-    PiecePlace gap{1.0 / 3.0, 1.0 / 3.0};
-    const int count = static_cast<int>(candidates_.size());
-    if (count == 0) worst = 1.0;
-    int nearest[3];
-    find_nearest(candidates_.data(), count, nearest);
-    drop_dominated(candidates_.data(), count, nearest, kept_);
-    Piece piece;
-    for (const int self : kept_) {
-        clip_piece(candidates_.data(), kept_, self, piece);
-        const double* d = candidates_[self].d;
-        for (int i = 0; i < piece.count; ++i) {
-            const double b1 = piece.vertices[i].u, b2 = piece.vertices[i].v, b0 = 1.0 - b1 - b2;
-            const double bend = b0 * b1 * edge2[0] + b1 * b2 * edge2[1] + b2 * b0 * edge2[2];
-            const double distance = std::sqrt(std::max(0.0, b0 * d[0] + b1 * d[1] + b2 * d[2] - bend));
-            const double r = b0 * node.radius[0] + b1 * node.radius[1] + b2 * node.radius[2];
-            if (distance - r > worst * r) {
-                worst = (distance - r) / r;
-                gap = piece.vertices[i];
-            }
-        }
-    }
-    if (worst <= kGapTolerance) return Outcome::covered;
-    const double b0 = 1.0 - gap.u - gap.v;
-    const double u = node.place[0].x * b0 + node.place[1].x * gap.u + node.place[2].x * gap.v;
-    const double v = node.place[0].y * b0 + node.place[1].y * gap.u + node.place[2].y * gap.v;
-    return try_place(f, u, v, true) ? Outcome::placed : Outcome::covered;
-}
-
-// Place a point at barycentrics (u, v) of the fragment if it is still free once rounded to what is stored. With
-// may_shift the roundings next to it are tried as well, so that a gap is closed even where floats are coarse.
-bool TileFiller::try_place(const Fragment& f, double u, double v, bool may_shift) {
-    const V2d exact = f.uv[0] * (1.0 - u - v) + f.uv[1] * u + f.uv[2] * v;
-    V2f uv(std::max(0.0f, float(exact.x)), std::max(0.0f, float(exact.y)));
-    if (double(uv.x) + uv.y > 1.0) uv.x = std::nextafter(1.0f - uv.y, 0.0f);
-
-    const V3i& t = mesh_.triangles[f.triangle];
-    const V3d a(mesh_.positions[t.x]), b(mesh_.positions[t.y]), c(mesh_.positions[t.z]);
-    const V3d place = a * (1.0 - uv.x - uv.y) + b * double(uv.x) + c * double(uv.y);
-    const V3f near = f.corners[0] * float(1.0 - u - v) + f.corners[1] * float(u) + f.corners[2] * float(v);
-    const double radius = spacing_at(f.triangle, uv);
-    V3f world(place);
-    if (!is_free(world, near, f.normal, radius)) {
-        if (!may_shift) return false;
-        bool is_found = false;
-        for (int shift = 0; shift < 27 && !is_found; ++shift) {
-            V3f moved(place);
-            for (int axis = 0, s = shift; axis < 3; ++axis, s /= 3) {
-                if (s % 3 != 0) moved[axis] = std::nextafter(moved[axis], s % 3 == 1 ? -HUGE_VALF : HUGE_VALF);
-            }
-            is_found = is_free(moved, near, f.normal, radius);
-            if (is_found) world = moved;
-        }
-        if (!is_found) return false;
-    }
-    near_.add(V3f(frame_.to_local(world)), f.normal, world);
-    darts_->push_back({world, f.normal, f.triangle, uv});
     return true;
 }
 
-bool TileFiller::is_free(const V3f& world, const V3f& near, const V3f& normal, double radius) const {
+void TileFiller::find(std::size_t i) {
+    const Patch& patch = patches_[i];
+    find_candidates(near_, states_[i].cell, patch,
+                    (patch.radius + patch.largest_spacing * kReachSlack) * kReachSlack + float(rounding_),
+                    least_cosine(points_.thin_walls), candidates_);
+}
+
+// Throw darts evenly over the tile: most points come from here.
+void TileFiller::throw_evenly(double density) {
+    for (const std::uint32_t i : order_) {
+        const Patch& patch = patches_[i];
+        const V2f extent = patch.high - patch.low;
+        const float spacing = 0.5f * (patch.least_spacing + patch.largest_spacing);
+        int tries = int(float(density) * extent.x * extent.y / (spacing * spacing) + random_.next_float());
+        if (tries == 0) continue;
+        find(i);
+        V2f hit;
+        while (throw_darts(patch, candidates_, ~std::uint64_t(0), random_, tries, hit)) {
+            place(patch, hit.x, hit.y, 0);
+        }
+    }
+}
+
+// Throw darts where no ball covers the surface, until few are left.
+void TileFiller::throw_into_gaps() {
+    for (const std::uint32_t i : order_) {
+        const Patch& patch = patches_[i];
+        find(i);
+        std::uint64_t cells = uncovered_cells(patch, candidates_, 0, ~std::uint64_t(0));
+        int tries = kMostMisses;
+        V2f hit;
+        while (cells != 0 && throw_darts(patch, candidates_, cells, random_, tries, hit)) {
+            const int known = candidates_.count;
+            if (place(patch, hit.x, hit.y, 0)) {
+                cells = uncovered_cells(patch, candidates_, known, cells);
+                tries = kMostMisses;
+            }
+        }
+    }
+}
+
+// Share a patch out, with points where it has gaps.
+void TileFiller::cover(std::size_t i) {
+    const Patch& patch = patches_[i];
+    find(i);
+    const float band = 4.0f * kDistanceError * patch.largest_spacing * patch.largest_spacing;
+    while (true) {
+        Gap gap;
+        if (share_patch(patch, candidates_, shares_, gap)) {
+            if (candidates_.count > 0 && gap.excess2 < -band) break;
+            if (gap.excess2 > band) {
+                const V2f inside = gap.place(random_.next_float());
+                if (place(patch, inside.x, inside.y, 0)) continue;
+                if (place(patch, gap.corner.x, gap.corner.y, 0)) continue;
+            }
+        }
+        share_exactly(patch, frame_, candidates_, near_.worlds, kGapTolerance, shares_, gaps_);
+        if (gaps_.empty()) break;
+        const bool is_placed =
+            std::any_of(gaps_.begin(), gaps_.end(), [&](const ExactGap& at) { return place(patch, at.x, at.y, 1); });
+        // Where floats are too coarse to place a point in it, the gap stays.
+        if (!is_placed && !place_somewhere(patch)) break;
+    }
+    keep_shares(i);
+}
+
+// Try many places of a patch, each with the floats around it.
+bool TileFiller::place_somewhere(const Patch& patch) {
+    int tries = kCoarseTries;
+    V2f hit;
+    while (throw_darts(patch, candidates_, uncovered_cells(patch, candidates_, 0, ~std::uint64_t(0)), random_, tries,
+                       hit)) {
+        if (place(patch, hit.x, hit.y, 2)) return true;
+    }
+    return false;
+}
+
+// Share a patch out once more if points came near it after its turn.
+void TileFiller::share_again(std::size_t i) {
+    PatchState& state = states_[i];
+    if (near_.count(state.cell) == state.cell_count) return;
+    find(i);
+    bool is_same = true;
+    for (int k = 0; k < candidates_.count; ++k) is_same &= candidates_.points[k] < state.point_count;
+    if (is_same) return;
+    share(i);
+    keep_shares(i);
+}
+
+void TileFiller::share(std::size_t i) {
+    Gap gap;
+    if (!share_patch(patches_[i], candidates_, shares_, gap)) {
+        share_exactly(patches_[i], frame_, candidates_, near_.worlds, kGapTolerance, shares_, gaps_);
+    }
+}
+
+void TileFiller::keep_shares(std::size_t i) {
+    PatchState& state = states_[i];
+    state.cell_count = near_.count(state.cell);
+    state.point_count = static_cast<std::uint32_t>(near_.size());
+    state.first_share = static_cast<std::uint32_t>(all_shares_.size());
+    state.share_count = static_cast<std::uint32_t>(shares_.size());
+    all_shares_.insert(all_shares_.end(), shares_.begin(), shares_.end());
+}
+
+void TileFiller::add_areas(const Patch& patch, const Share* shares, std::size_t count) {
+    double total = 0.0;
+    for (std::size_t i = 0; i < count; ++i) total += shares[i].weight;
+    const double quanta = patch.area / points_.area_quantum;
+    if (total > 0.0) {
+        for (std::size_t i = 0; i < count; ++i) {
+            quanta_[shares[i].point] += static_cast<std::int64_t>(quanta * (shares[i].weight / total));
+        }
+        return;
+    }
+    // Only where floats are too coarse to place a point or to tell shares apart: the nearest there is takes it.
+    std::size_t nearest = 0;
+    double least2 = HUGE_VAL;
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+        const double d2 = (frame_.to_local(near_.worlds[i]) - V3d(patch.center)).length2();
+        if (d2 < least2) least2 = d2, nearest = i;
+    }
+    if (near_.size() > 0) quanta_[nearest] += static_cast<std::int64_t>(quanta);
+}
+
+void TileFiller::flush_areas() {
+    for (std::size_t i = 0; i < quanta_.size(); ++i) {
+        if (quanta_[i] != 0) {
+            std::atomic_ref<std::int64_t>(entered_[i]->quanta).fetch_add(quanta_[i], std::memory_order_relaxed);
+        }
+    }
+}
+
+// Place a point at (x, y) of the patch if it is still free once rounded to what is stored. The floats up
+// to `most_steps` from it are tried as well, so that a gap is closed even where floats are coarse.
+bool TileFiller::place(const Patch& patch, double x, double y, int most_steps) {
+    // The nearest place of the triangle.
+    const V3d local = V3d(patch.center) + V3d(patch.axes[0]) * x + V3d(patch.axes[1]) * y;
+    const V3i& t = points_.mesh.triangles[patch.triangle];
+    const V3d a(points_.mesh.positions[t.x]);
+    const V3d ab = V3d(points_.mesh.positions[t.y]) - a, ac = V3d(points_.mesh.positions[t.z]) - a;
+    const V3d from_a = local * frame_.unit + frame_.origin() - a, cross = ab.cross(ac);
+    const double inverse = 1.0 / cross.length2();
+    const double u = std::clamp(from_a.cross(ac).dot(cross) * inverse, 0.0, 1.0);
+    const double v = std::clamp(ab.cross(from_a).dot(cross) * inverse, 0.0, 1.0 - u);
+    const V3d place = a + ab * u + ac * v;
+    const SpacingField& field = points_.spacing;
+    const double spacing =
+        !field.per_vertex ? field.constant
+                          : field.at_vertex(t.x) * (1.0 - u - v) + field.at_vertex(t.y) * u + field.at_vertex(t.z) * v;
+
+    V3f world = to_stored(place);
+    const auto is_free_at = [&](const V3f& at) {
+        return is_free(at, x, y, (frame_.to_local(at) - local).length(), spacing);
+    };
+    if (!is_free_at(world)) {
+        if (most_steps == 0) return false;
+        bool is_found = false;
+        for (int x_steps = -most_steps; x_steps <= most_steps && !is_found; ++x_steps) {
+            for (int y_steps = -most_steps; y_steps <= most_steps && !is_found; ++y_steps) {
+                for (int z_steps = -most_steps; z_steps <= most_steps && !is_found; ++z_steps) {
+                    const V3f moved(stepped(world.x, x_steps), stepped(world.y, y_steps), stepped(world.z, z_steps));
+                    is_found = is_free_at(moved);
+                    if (is_found) world = moved;
+                }
+            }
+        }
+        if (!is_found) return false;
+    }
+    V2f uv{float(u), float(v)};
+    if (double(uv.x) + uv.y > 1.0) uv.x = std::nextafter(1.0f - uv.y, 0.0f);
+    const V3f stored(frame_.to_local(world));
+    const std::uint32_t point = near_.add(stored, patch.normal, world);
+    const V3f d = stored - patch.center;
+    candidates_.add(d.dot(patch.axes[0]), d.dot(patch.axes[1]), d.length2(), point);
+    placed_.push_back({world, patch.normal, patch.triangle, uv, 0});
+    return true;
+}
+
+// Whether no candidate is nearer than the spacing, metres, to a place that is stored `shift` from (x, y).
+bool TileFiller::is_free(const V3f& world, double x, double y, double shift, double spacing) const {
+    const Candidates& c = candidates_;
+    const auto seen = float(spacing / frame_.unit * (1.0 + kDistanceError) + shift);
+    const auto near_x = float(x), near_y = float(y);
+    const float limit = seen * seen - (near_x * near_x + near_y * near_y);
     const V3d place(world);
-    // Look a little farther than the spacing, by what rounding may have moved the place.
-    const float seen = float(radius / frame_.unit) * 1.005f + float((frame_.to_local(world) - V3d(near)).length());
-    return !near_.any_near(near, normal, seen * seen,
-                           [&](std::uint32_t p) { return (V3d(near_.worlds[p]) - place).length2() < radius * radius; });
+    for (int i = 0; i < c.count; ++i) {
+        if (c.s[i] - 2.0f * (c.x[i] * near_x + c.y[i] * near_y) >= limit) continue;
+        if ((V3d(near_.worlds[c.points[i]]) - place).length2() < spacing * spacing) return false;
+    }
+    return true;
 }
 
 }  // namespace frazil

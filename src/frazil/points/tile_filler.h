@@ -1,8 +1,8 @@
-// Poisson points in one tile: darts at random, then every piece of surface taken up until it is covered.
-// Model: greedy dart throwing, uniform at first; then each fragment is halved until its parts lie in the ball of one point,
-//   with a dart into every part that does not; what is left at 1/32 of the spacing is split exactly among its nearest
-//   points, whose farthest corner takes a point where it lies beyond the spacing. So a fragment is done only when it is
-//   covered, by construction.
+// Poisson points in one tile, and the surface that is nearest to each of them.
+// Model: darts at random, first evenly over the tile, then patch by patch where no ball of a point covers the surface yet.
+//   Then every patch is shared out among its nearest points: where a corner of a share is farther from its point than the
+//   spacing, a point is put into that corner, where it conflicts with nobody. A patch is left only when there is none: so it
+//   is covered by construction, and its shares are the areas.
 // Units: darts in metres; inside, the tile's own unit.
 // Valid: sees the points that neighbouring tiles have already; a result is a function of those and the seed alone.
 // Not: thread-safe; one filler per thread, which keeps its memory from tile to tile.
@@ -11,86 +11,86 @@
 #include <cstdint>
 #include <vector>
 
-#include "frazil/points/fragment.h"
-#include "frazil/points/nearest_piece.h"
+#include "frazil/points/exact_shares.h"
 #include "frazil/points/neighbourhood.h"
+#include "frazil/points/patch_kernel.h"
+#include "frazil/points/tile_grid.h"
 
 namespace frazil {
 
-// A point while points are made: what a PointSet keeps, but for the area.
+// A point while points are made: what a PointSet keeps, its area in quanta.
 struct Dart {
     V3f position;
     V3f normal;
     std::int32_t triangle;
     V2f uv;
+    // Many tiles add to it: in whole numbers, so that their order does not matter.
+    std::int64_t quanta;
 };
 
-// How far from a fragment's centroid the points can lie that matter to it.
-inline float fragment_reach(const Fragment& f) {
-    const V3f centroid = (f.corners[0] + f.corners[1] + f.corners[2]) * (1.0f / 3.0f);
-    float extent2 = 0.0f, radius = 0.0f;
-    for (int k = 0; k < 3; ++k) {
-        extent2 = std::max(extent2, (f.corners[k] - centroid).length2());
-        radius = std::max(radius, f.radii[k]);
-    }
-    return (radius * 1.01f + std::sqrt(extent2)) * 1.001f;
-}
-
-inline constexpr double kCellWidth = 1.2;  // of the cells of points, beside the reach of look-ups
+// What the points of a mesh are made from, and those of each tile that there are already.
+struct PointsInTiles {
+    const Mesh& mesh;
+    SpacingField spacing;
+    bool thin_walls;
+    std::uint32_t seed;
+    double unit;          // the reference spacing, metres
+    double area_quantum;  // m²
+    TileGrid grid;
+    std::vector<std::vector<Dart>> darts;
+};
 
 class TileFiller {
   public:
-    TileFiller(const Mesh& mesh, const SpacingField& spacing, bool thin_walls, std::uint32_t seed)
-        : mesh_(mesh), spacing_(spacing), thin_walls_(thin_walls), seed_(seed) {}
+    explicit TileFiller(PointsInTiles& points) : points_(points) {}
 
-    // Cover the fragments of the tile's triangles; `around` are the points of the tiles around it, `key` names the tile.
-    void fill(const TileFrame& frame, const std::int32_t* triangles, std::size_t triangle_count,
-              const std::vector<const std::vector<Dart>*>& around, std::uint64_t key, std::vector<Dart>& darts);
+    // Place the tile's points, and add to all points the areas of those patches that no later tile can change.
+    void fill(std::size_t tile);
+
+    // Once all tiles are filled: add the areas of the other patches of the tile.
+    void share_border(std::size_t tile);
 
   private:
-    struct Node;
-    enum class Outcome { covered, placed };
+    struct PatchState {
+        std::uint32_t cell;         // of the neighbourhood
+        std::uint32_t cell_count;   // of its points when the patch was shared out
+        std::uint32_t point_count;  // likewise, of all
+        std::uint32_t first_share, share_count;
+    };
 
-    float random() { return next_random(); }
-    float next_random();
-    double spacing_at(std::int32_t triangle, const V2f& uv) const;
+    void begin(std::size_t tile);
+    void prepare_neighbourhood();
+    void enter(std::vector<Dart>& darts);
+    bool is_final(const Patch& patch) const;
+    void find(std::size_t patch);
+    void throw_evenly(double density);
+    void throw_into_gaps();
+    void cover(std::size_t patch);
+    bool place_somewhere(const Patch& patch);
+    void share_again(std::size_t patch);
+    void share(std::size_t patch);
+    void keep_shares(std::size_t patch);
+    void add_areas(const Patch& patch, const Share* shares, std::size_t count);
+    void flush_areas();
+    bool place(const Patch& patch, double x, double y, int most_steps);
+    bool is_free(const V3f& world, double x, double y, double shift, double spacing) const;
 
-    void throw_darts();
-    void cover(const Fragment& fragment);
-    bool gather(const Fragment& fragment, Node& root);
-    Outcome cover_node(const Fragment& fragment, const Node& node);
-    Outcome close_gap(const Fragment& fragment, const Node& node);
-    bool try_place(const Fragment& fragment, double u, double v, bool may_shift);
-    bool is_free(const V3f& world, const V3f& near, const V3f& normal, double radius) const;
-
-    const Mesh& mesh_;
-    const SpacingField& spacing_;
-    bool thin_walls_;
-    std::uint32_t seed_;
-
+    PointsInTiles& points_;
+    std::size_t tile_ = 0;
     TileFrame frame_;
-    std::uint32_t tile_seed_ = 0, drawn_ = 0;
-    std::vector<Dart>* darts_ = nullptr;
-    std::vector<Fragment> fragments_;
-    std::vector<double> cumulative_;
-    std::vector<std::uint32_t> guide_, order_;
+    double rounding_ = 0.0;  // how far a place can be from where it is stored
+    RandomStream random_;
+    std::vector<TileGrid::Neighbour> around_;
+    std::vector<Patch> patches_;
+    std::vector<PatchState> states_;
+    std::vector<std::uint32_t> order_;
     Neighbourhood near_;
-    std::vector<CornerDistances> candidates_;
-    std::vector<int> kept_;
+    std::vector<Dart*> entered_;  // the points in near_ that other tiles, or a filled one, have
+    std::vector<Dart> placed_;    // those after them
+    Candidates candidates_;
+    std::vector<Share> shares_, all_shares_;
+    std::vector<ExactGap> gaps_;
+    std::vector<std::int64_t> quanta_;  // for each point in near_
 };
-
-// The points of neighbouring tiles that lie within `reach` of the tile, entered into `near`.
-template <class Enter>
-void for_each_around(const TileFrame& frame, double reach, const std::vector<Dart>& darts, const Enter& enter) {
-    for (std::size_t i = 0; i < darts.size(); ++i) {
-        const V3f local(frame.to_local(darts[i].position));
-        double gap2 = 0.0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const double gap = std::max(0.0, std::max(-double(local[axis]), local[axis] - frame.size));
-            gap2 += gap * gap;
-        }
-        if (gap2 <= reach * reach) enter(i, local);
-    }
-}
 
 }  // namespace frazil

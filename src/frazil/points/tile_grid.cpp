@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "frazil/base/parallel.h"
-#include "frazil/points/fragment.h"
 #include "frazil/points/polygon_clip.h"
 
 namespace frazil {
@@ -13,6 +12,7 @@ namespace {
 
 constexpr int kAxisBits = 21;
 constexpr std::size_t kTriangleGrain = 4096;
+constexpr double kHair = 1e-9;  // of a tile
 
 struct Pair {
     std::uint64_t key;
@@ -55,8 +55,9 @@ struct TriangleTiler {
 
     using Polygon = ClipPolygon<V3d>;
 
-    int tile_along(double position, int axis) const {
-        const double t = std::floor((position - grid.origin[axis]) / grid.size);
+    // A hair beside the place, so that no rounding leaves a tile out.
+    int tile_along(double position, int axis, double hair) const {
+        const double t = std::floor((position - grid.origin[axis]) / grid.size + hair);
         return static_cast<int>(std::clamp(t, 0.0, double((1 << kAxisBits) - 1)));
     }
 
@@ -67,8 +68,8 @@ struct TriangleTiler {
                 least = std::min(least, polygon.vertices[i][axis]);
                 most = std::max(most, polygon.vertices[i][axis]);
             }
-            low[axis] = std::clamp(tile_along(least, axis), low[axis], high[axis]);
-            high[axis] = std::clamp(tile_along(most, axis), low[axis], high[axis]);
+            low[axis] = std::clamp(tile_along(least, axis, -kHair), low[axis], high[axis]);
+            high[axis] = std::clamp(tile_along(most, axis, kHair), low[axis], high[axis]);
         }
         const V3i extent = high - low;
         const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
@@ -83,10 +84,6 @@ struct TriangleTiler {
         Polygon below = polygon, above = polygon;
         below.clip([&](const V3d& v) { return v[axis] - plane; }, mix);
         above.clip([&](const V3d& v) { return plane - v[axis]; }, mix);
-        // What lies in the plane belongs to the tile below it alone.
-        bool any_above = false;
-        for (int i = 0; i < polygon.count; ++i) any_above |= polygon.vertices[i][axis] > plane;
-        if (!any_above) above.count = 0;
         V3i below_high = high, above_low = low;
         below_high[axis] = middle;
         above_low[axis] = middle + 1;
@@ -97,13 +94,13 @@ struct TriangleTiler {
 
 }  // namespace
 
-V3d TileGrid::tile_origin(std::size_t tile) const {
-    return origin + V3d(tile_of(keys[tile])) * size;
+TileFrame TileGrid::frame(std::size_t tile, double unit) const {
+    return {origin, size, tile_of(keys[tile]), unit};
 }
 
-std::vector<std::uint32_t> TileGrid::neighbours(std::size_t tile) const {
+std::vector<TileGrid::Neighbour> TileGrid::neighbours(std::size_t tile) const {
     const V3i center = tile_of(keys[tile]);
-    std::vector<std::uint32_t> found;
+    std::vector<Neighbour> found;
     for (int dz = -1; dz <= 1; ++dz) {
         for (int dy = -1; dy <= 1; ++dy) {
             for (int dx = -1; dx <= 1; ++dx) {
@@ -112,14 +109,16 @@ std::vector<std::uint32_t> TileGrid::neighbours(std::size_t tile) const {
                 if (std::max(place.x, std::max(place.y, place.z)) >= 1 << kAxisBits) continue;
                 const std::uint64_t key = morton(place);
                 const auto at = std::lower_bound(keys.begin(), keys.end(), key);
-                if (at != keys.end() && *at == key) found.push_back(std::uint32_t(at - keys.begin()));
+                if (at != keys.end() && *at == key) {
+                    found.push_back({std::uint32_t(at - keys.begin()), V3i(dx, dy, dz)});
+                }
             }
         }
     }
     return found;
 }
 
-TileGrid make_tile_grid(const Mesh& mesh, double tile_size, std::uint64_t max_pairs) {
+TileGrid make_tile_grid(const Mesh& mesh, const SpacingField& spacing, double tile_size, std::uint64_t max_pairs) {
     const Box3f box = bounds(mesh);
     const V3d extent = V3d(box.max) - V3d(box.min);
     const double widest = std::max(extent.x, std::max(extent.y, extent.z));
@@ -130,17 +129,30 @@ TileGrid make_tile_grid(const Mesh& mesh, double tile_size, std::uint64_t max_pa
 
     const std::size_t chunks = (mesh.triangles.size() + kTriangleGrain - 1) / kTriangleGrain;
     std::vector<std::vector<Pair>> chunk_pairs(chunks);
+    std::vector<double> overhangs(chunks, 0.0);
     parallel_for(mesh.triangles.size(), kTriangleGrain, [&](std::size_t begin, std::size_t end) {
         std::vector<Pair>& pairs = chunk_pairs[begin / kTriangleGrain];
         pairs.reserve(end - begin);
         for (std::size_t i = begin; i < end; ++i) {
             if (unit_normal(mesh, i) == V3f(0.0f)) continue;
+            double& overhang = overhangs[begin / kTriangleGrain];
+            if (is_whole(mesh, spacing, i)) {
+                overhang = std::max(overhang, kWholeReach * longest_edge(mesh, i));
+                const V3i tile = TileFrame::tile_at(circle_center(mesh, i), grid.origin, grid.size);
+                pairs.push_back({morton(tile), std::int32_t(i)});
+                continue;
+            }
+            const V3i& t = mesh.triangles[i];
+            overhang =
+                std::max(overhang, kPartReach * std::max(spacing.at_vertex(t.x),
+                                                         std::max(spacing.at_vertex(t.y), spacing.at_vertex(t.z))));
             TriangleTiler::Polygon polygon;
             for (int k = 0; k < 3; ++k) polygon.push(V3d(mesh.positions[mesh.triangles[i][k]]));
             TriangleTiler{grid, std::int32_t(i), pairs, max_pairs}.visit(polygon, V3i(0), V3i((1 << kAxisBits) - 1));
         }
     });
 
+    for (const double overhang : overhangs) grid.overhang = std::max(grid.overhang, overhang);
     std::size_t total = 0;
     for (const auto& part : chunk_pairs) total += part.size();
     if (total > max_pairs) throw std::length_error("tiles");

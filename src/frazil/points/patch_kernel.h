@@ -1,0 +1,83 @@
+// What is done most with a patch and the points near it: find them, throw darts, share the patch out. Eight numbers at a
+// time, for the processor that it runs on.
+// Model: in the plane of a patch a point p counts by its projection (x, y) and its squared distance s from the patch's
+//   centre, as |z - p|² = |z|² + s - 2 z·p for all z in the plane. So the bisector of two points is a line, and the part of the
+//   patch nearest to p is the patch cut by one line per other point. Where spacing is linear, the gap from a part to its
+//   point is largest at a corner of the part.
+// Units: the tile's own (see TileFrame).
+// Valid: float precision, about 1e-6 spacings; the same bits on every processor. share_patch gives up (returns false) where a
+//   part has more than eight corners or rounding has bent it; exact_shares.h does those.
+// Not: placing points.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "frazil/points/neighbourhood.h"
+#include "frazil/points/patch.h"
+
+namespace frazil {
+
+// Float distances between a place and a point err by less than this, in spacings.
+inline constexpr float kDistanceError = 2e-5f;
+
+// Random numbers: a stream of 64 bits at a time, from a seed of its own [Steele2014].
+struct RandomStream {
+    std::uint64_t state = 0;
+
+    std::uint64_t next() {
+        std::uint64_t x = state += 0x9e3779b97f4a7c15ULL;
+        x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9ULL;
+        x = (x ^ x >> 27) * 0x94d049bb133111ebULL;
+        return x ^ x >> 31;
+    }
+    float next_float() { return static_cast<float>(next() >> 40) * 0x1p-24f; }
+};
+
+// The points that can matter to a patch, on its side. After the last there is room for a whole group of lanes.
+struct Candidates {
+    std::vector<float> x, y, s;
+    std::vector<std::uint32_t> points;
+    int count = 0;
+
+    void reserve(std::size_t capacity);
+    void add(float px, float py, float ps, std::uint32_t point);
+};
+
+// A part of a patch that is nearest to one point.
+struct Share {
+    std::uint32_t point;
+    float weight;  // its area; what it is of the patch's, the sum of all weights tells
+};
+
+// Where a patch is farthest from its points: a corner of a share. There, squared distance less squared spacing.
+struct Gap {
+    V2f corner = V2f(0.0f);
+    float excess2 = -1e30f;
+    V2f point = V2f(0.0f);   // whose share it is
+    V2f middle = V2f(0.0f);  // of the share's corners
+
+    // A place of the share, from the corner to the middle, that is farther from the point than the spacing was at the
+    // corner; `random` in [0, 1) says how far in.
+    V2f place(float random) const;
+};
+
+// The points of a cell that lie within `reach` of the patch's centre and whose normals make a cosine above `least_cosine`
+// with its own.
+void find_candidates(const Neighbourhood& near, std::uint32_t cell, const Patch& patch, float reach, float least_cosine,
+                     Candidates& candidates);
+
+// A bit for each cell of an 8 x 8 grid over the patch's bounds, without those of `cells` that lie in the ball of one of the
+// candidates from `first` on.
+std::uint64_t uncovered_cells(const Patch& patch, const Candidates& candidates, int first, std::uint64_t cells);
+
+// Throw up to `tries` darts (which are counted down) into the marked cells, evenly, until one hits the patch where no
+// candidate is nearer than the spacing.
+bool throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
+                 int& tries, V2f& hit);
+
+// Share the patch among the points nearest to it. Sorts the candidates, nearest to the centre first. False where it gave up.
+bool share_patch(const Patch& patch, Candidates& candidates, std::vector<Share>& shares, Gap& gap);
+
+}  // namespace frazil
