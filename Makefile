@@ -8,6 +8,11 @@ RESOLUTION ?= 960x540
 SAMPLES    ?= 32
 # Of the example's meshes: finer above 1. A scene that is there already for this detail is left as it is.
 DETAIL     ?= 0.75
+# Of the pictures of `make figures`.
+FIGURE_RESOLUTION ?= 320x180
+FIGURE_SAMPLES    ?= 12
+# For `make bench`: --full for large sizes.
+BENCH ?=
 OUT        ?= out
 
 STAMPS := $(VENV)/stamps
@@ -29,7 +34,7 @@ PIP_INSTALL    := pip install -q --disable-pip-version-check
 CMAKE_CONFIG   := -C build-dir=$(BUILD) -C cmake.define.FRAZIL_BUILD_TESTS=ON
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build render test quick test-cpp sanitize lint format stubs wheel check-wheel clean distclean
+.PHONY: help setup build render figures bench test quick test-cpp sanitize lint format stubs wheel check-wheel clean distclean
 .DELETE_ON_ERROR:
 
 help: ## List the targets
@@ -78,6 +83,14 @@ render: $(STAMPS)/package ## Render the example scene: RESOLUTION=960x540 SAMPLE
 	@mkdir -p $(OUT)
 	@python examples/glacier.py -o $(OUT)/glacier.usda --detail $(DETAIL)
 	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES)
+
+figures: $(STAMPS)/package ## Render the talk's figures anew into docs/images: FIGURE_RESOLUTION=320x180
+	@$(PIP_INSTALL) matplotlib Pillow
+	@python examples/figures.py -o docs/images --work $(OUT)/figures --resolution $(FIGURE_RESOLUTION) --samples $(FIGURE_SAMPLES)
+
+bench: $(STAMPS)/package ## Race against the peers, one table in bench/results: BENCH=--full for large sizes
+	@$(PIP_INSTALL) matplotlib Pillow
+	@python bench/all.py $(BENCH)
 
 # ---- test -----------------------------------------------------------------------------------------------------------
 

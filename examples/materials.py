@@ -4,8 +4,8 @@
     python examples/materials.py models -o out/materials_models.png
 
 `surface`: a block of ice, plain; with a normal map; displaced by the image that the map is made of; by Frazil's cells.
-`models`: above, translucent ice by frazil:ice, MaterialX frazil_ice, standard_surface and open_pbr_surface; below,
-clear ice by the same four. Images, a USD stage and a MaterialX document are written beside it, under materials/.
+`models`: above, translucent ice by frazil:ice, MaterialX frazil_ice, standard_surface, open_pbr_surface; below, clear
+ice by the same four. Images, a USD stage and a MaterialX document are written beside the picture, under materials/.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import frazil as fz
 from frazil.formations.sky import make_sky
 from frazil.image import write_png
 
-kSun = np.array([-0.85, 0.5, 0.5])  # from the left, grazing the fronts
+kSun = np.array([-0.8, 0.5, -0.35])
 kTexels = 256
 kTypes = Sdf.ValueTypeNames
 
@@ -166,7 +166,7 @@ def add_texture(stage: Usd.Stage, path: str, file: str, size: float, **inputs) -
 
 def surface_scene(folder: Path) -> fz.Scene:
     """Plain, normal-mapped, displaced by an image, displaced by a pattern."""
-    repeat, depth = 0.8, 0.06
+    repeat, depth = 0.9, 0.05
     height = draw_height(folder / "height.exr")
     draw_normals(folder / "normals.exr", height, depth / repeat)
     stage = new_stage(folder / "surface.usda", 4)
@@ -177,7 +177,7 @@ def surface_scene(folder: Path) -> fz.Scene:
         ice = UsdShade.Shader.Define(stage, f"{base}/Surface")
         ice.CreateIdAttr("frazil:ice")
         ice.CreateInput("albedo", kTypes.Color3f).Set(Gf.Vec3f(0.78, 0.9, 0.95))
-        ice.CreateInput("mean_free_path", kTypes.Color3f).Set(Gf.Vec3f(0.009, 0.014, 0.02))
+        ice.CreateInput("mean_free_path", kTypes.Color3f).Set(Gf.Vec3f(0.03, 0.05, 0.07))
         ice.CreateInput("roughness", kTypes.Float).Set(0.22)
         ice.CreateInput("refraction", kTypes.Float).Set(0.0)
         material.CreateSurfaceOutput().ConnectToSource(ice.ConnectableAPI(), "surface")
@@ -243,9 +243,8 @@ def add_usd_ice(stage: Usd.Stage, block: UsdGeom.Mesh, words: str) -> None:
     UsdShade.MaterialBindingAPI.Apply(block.GetPrim()).Bind(material)
 
 
-def render(scene: fz.Scene, options: argparse.Namespace) -> np.ndarray:
-    size = (4 * options.size, options.size)
-    film = fz.render(scene, resolution=size, samples=options.samples, spacing_scale=1.5, denoise=options.denoise)
+def render(scene: fz.Scene, size: int, samples: int) -> np.ndarray:
+    film = fz.render(scene, resolution=(4 * size, size), samples=samples, spacing_scale=1.5)
     return np.asarray(film.layers["beauty"])[..., :3]
 
 
@@ -255,17 +254,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
     parser.add_argument("--size", type=int, default=200, help="pixels along a side of one block's picture")
     parser.add_argument("--samples", type=int, default=48, help="per pixel")
-    parser.add_argument("--denoise", action="store_true", help="with Open Image Denoise (pip install frazil[denoise])")
     options = parser.parse_args(arguments)
     start = time.monotonic()
     folder = options.output.parent / "materials"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if options.what == "surface":
-            pixels = render(surface_scene(folder), options)
+            pixels = render(surface_scene(folder), options.size, options.samples)
         else:
             scenes = [models_scene(folder, kTranslucent, "translucent"), models_scene(folder, kClear, "clear")]
-            pixels = np.concatenate([render(scene, options) for scene in scenes])
+            pixels = np.concatenate([render(scene, options.size, options.samples) for scene in scenes])
         write_png(options.output, np.ascontiguousarray(pixels))
     except OSError as error:
         print(error, file=sys.stderr)
