@@ -8,6 +8,7 @@ RESOLUTION ?= 960x540
 SAMPLES    ?= 32
 # Of the example's meshes: finer above 1. A scene that is there already for this detail is left as it is.
 DETAIL     ?= 0.75
+SECONDS    ?= 60
 # Of the pictures of `make figures`.
 FIGURE_RESOLUTION ?= 320x180
 FIGURE_SAMPLES    ?= 12
@@ -34,13 +35,14 @@ PIP_INSTALL    := pip install -q --disable-pip-version-check
 CMAKE_CONFIG   := -C build-dir=$(BUILD) -C cmake.define.FRAZIL_BUILD_TESTS=ON
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build render figures bench test quick test-cpp sanitize lint format stubs wheel check-wheel clean distclean
+.PHONY: help setup build render figures bench test quick test-cpp sanitize fuzz docs lint format stubs wheel check-wheel \
+        clean distclean
 .DELETE_ON_ERROR:
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 	@echo
-	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) DETAIL=$(DETAIL) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
+	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) DETAIL=$(DETAIL) SECONDS=$(SECONDS) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
 
 # ---- set-up ---------------------------------------------------------------------------------------------------------
 
@@ -57,6 +59,11 @@ $(STAMPS)/runtime: $(STAMPS)/venv pyproject.toml scripts/requirements.py
 $(STAMPS)/test: $(STAMPS)/runtime
 	@echo "setup: Python packages to test"
 	@scripts/setup.sh python $(VENV) test
+	@touch $@
+
+$(STAMPS)/docs: $(STAMPS)/venv pyproject.toml
+	@echo "setup: Python packages for the documentation's site"
+	@scripts/setup.sh python $(VENV) docs
 	@touch $@
 
 setup: $(STAMPS)/runtime ## Install what is missing: Debian packages, .venv, Python packages
@@ -107,6 +114,12 @@ sanitize: $(STAMPS)/runtime ## Run the C++ tests under AddressSanitizer and UBSa
 	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DFRAZIL_BUILD_TESTS=ON -DFRAZIL_SANITIZE=ON
 	@cmake --build build/sanitize --target frazil_tests
 	@UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ctest --test-dir build/sanitize --output-on-failure
+
+fuzz: $(STAMPS)/test ## Fuzz every reader: SECONDS=60 for each of them
+	@python tests/fuzz/fuzz.py --seconds $(SECONDS)
+
+docs: $(STAMPS)/docs ## Build the documentation's site into out/site; a broken link is an error
+	@NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
 
 FORMATTED := src tests/cpp
 
