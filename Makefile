@@ -8,6 +8,12 @@ RESOLUTION ?= 960x540
 SAMPLES    ?= 32
 # Of the example's meshes: finer above 1. A scene that is there already for this detail is left as it is.
 DETAIL     ?= 0.75
+SECONDS    ?= 60
+# Of the pictures of `make figures`.
+FIGURE_RESOLUTION ?= 320x180
+FIGURE_SAMPLES    ?= 12
+# For `make bench`: --full for large sizes.
+BENCH ?=
 OUT        ?= out
 
 STAMPS := $(VENV)/stamps
@@ -29,13 +35,14 @@ PIP_INSTALL    := pip install -q --disable-pip-version-check
 CMAKE_CONFIG   := -C build-dir=$(BUILD) -C cmake.define.FRAZIL_BUILD_TESTS=ON
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build render test quick test-cpp sanitize lint format stubs wheel check-wheel clean distclean
+.PHONY: help setup build render figures bench test quick test-cpp sanitize fuzz docs lint format stubs wheel check-wheel \
+        clean distclean
 .DELETE_ON_ERROR:
 
 help: ## List the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
 	@echo
-	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) DETAIL=$(DETAIL) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
+	@echo "  Variables: RESOLUTION=$(RESOLUTION) SAMPLES=$(SAMPLES) DETAIL=$(DETAIL) SECONDS=$(SECONDS) OUT=$(OUT) JOBS=$(JOBS) VENV=$(VENV)"
 
 # ---- set-up ---------------------------------------------------------------------------------------------------------
 
@@ -52,6 +59,11 @@ $(STAMPS)/runtime: $(STAMPS)/venv pyproject.toml scripts/requirements.py
 $(STAMPS)/test: $(STAMPS)/runtime
 	@echo "setup: Python packages to test"
 	@scripts/setup.sh python $(VENV) test
+	@touch $@
+
+$(STAMPS)/docs: $(STAMPS)/venv pyproject.toml
+	@echo "setup: Python packages for the documentation's site"
+	@scripts/setup.sh python $(VENV) docs
 	@touch $@
 
 setup: $(STAMPS)/runtime ## Install what is missing: Debian packages, .venv, Python packages
@@ -79,6 +91,14 @@ render: $(STAMPS)/package ## Render the example scene: RESOLUTION=960x540 SAMPLE
 	@python examples/glacier.py -o $(OUT)/glacier.usda --detail $(DETAIL)
 	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES)
 
+figures: $(STAMPS)/package ## Render the talk's figures anew into docs/images: FIGURE_RESOLUTION=320x180
+	@$(PIP_INSTALL) matplotlib Pillow
+	@python examples/figures.py -o docs/images --work $(OUT)/figures --resolution $(FIGURE_RESOLUTION) --samples $(FIGURE_SAMPLES)
+
+bench: $(STAMPS)/package ## Race against the peers, one table in bench/results: BENCH=--full for large sizes
+	@$(PIP_INSTALL) matplotlib Pillow
+	@python bench/all.py $(BENCH)
+
 # ---- test -----------------------------------------------------------------------------------------------------------
 
 test-cpp: $(STAMPS)/cpp_tests ## Run the C++ tests
@@ -94,6 +114,12 @@ sanitize: $(STAMPS)/runtime ## Run the C++ tests under AddressSanitizer and UBSa
 	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DFRAZIL_BUILD_TESTS=ON -DFRAZIL_SANITIZE=ON
 	@cmake --build build/sanitize --target frazil_tests
 	@UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ctest --test-dir build/sanitize --output-on-failure
+
+fuzz: $(STAMPS)/test ## Fuzz every reader: SECONDS=60 for each of them
+	@python tests/fuzz/fuzz.py --seconds $(SECONDS)
+
+docs: $(STAMPS)/docs ## Build the documentation's site into out/site; a broken link is an error
+	@NO_MKDOCS_2_WARNING=1 mkdocs build --strict --quiet
 
 FORMATTED := src tests/cpp
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-PEERS = ("pymeshlab", "libigl", "open3d", "trimesh")
+PEERS = ("pymeshlab", "libigl", "open3d", "trimesh", "mitsuba", "bpy")
 
 # Each runs as `python -c SCRIPT mesh count spacing output threads`: load, then time the sampler alone.
 COMMON = """
@@ -131,15 +131,16 @@ def peers_python(folder: Path) -> str:
     python = folder / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy", *PEERS], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy"], check=True)
+        for peer in PEERS:  # a peer without a package for this Python is a row that says so
+            subprocess.run([str(python), "-m", "pip", "install", "-q", peer])
     if find_library("usb-1.0") is None and os.geteuid() == 0:
         subprocess.run(["apt-get", "install", "-qq", "-y", "libusb-1.0-0"], capture_output=True)
     return str(python)
 
 
-def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
-    output.parent.mkdir(parents=True, exist_ok=True)
-    output.with_suffix(".json").write_text(json.dumps({"mesh": mesh, "area": area, "rows": rows}, indent=1))
+def table(rows: list[dict], mesh: str) -> list[str]:
+    """The rows as markdown."""
     lines = [
         f"`{mesh}`; times of the sampler alone, without loading; processor time of all its threads; "
         f"gap and nearest pair through the air.",
@@ -158,6 +159,13 @@ def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
             f"| {row['rate']:,.0f} "
             f"| {row['slower']:.1f} | {gap} | {row['spread']:.3f} | {row['bytes']:,.0f} |"
         )
+    return lines
+
+
+def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.with_suffix(".json").write_text(json.dumps({"mesh": mesh, "area": area, "rows": rows}, indent=1))
+    lines = table(rows, mesh)
     output.with_suffix(".md").write_text("\n".join(lines) + "\n")
     print("\n".join(lines))
     try:
@@ -214,11 +222,11 @@ def main() -> None:
         mesh, title = teapot(16), "teapot"
     else:
         mesh, title = read_mesh(options.mesh), options.mesh.name
-    rows = measure_all(mesh, title, options)
+    rows = measure_all(mesh, options)
     write(rows, options.output, title, mesh.area)
 
 
-def measure_all(mesh, title: str, options: argparse.Namespace) -> list[dict]:
+def measure_all(mesh, options: argparse.Namespace) -> list[dict]:
     """A row for every sampler and count of the options."""
     vertices, faces = mesh.positions.astype(np.float64), mesh.triangles.copy()
     rows = []

@@ -70,11 +70,11 @@ def set_scene(eye, to, focal_length: float = 50.0) -> fz.Scene:
     snow = fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
     scene.add_object("/snow", scene.add_mesh(ground, "/snow"), scene.add_material("/snow", snow))
     sky = make_sky(512, kSun, 5)
-    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=(0.9, 0.9, 0.9), path="/sky", group="sky"))
+    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=(0.75, 0.75, 0.75), path="/sky", group="sky"))
     scene.add_light(
         fz.Light(
             fz.DistantLight(2.5),
-            radiance=(4.6, 3.9, 3.0),
+            radiance=(3.4, 2.9, 2.3),
             normalize=True,
             matrix=frame(kSun, (0, 0, 0)),
             path="/sun",
@@ -105,7 +105,7 @@ def sheet(size: int, samples: int) -> np.ndarray:
     for name in ICE_PRESETS:
         row = []
         for age in kAges:
-            scene = set_scene((1.5, 1.05, 2.6), (0.0, 0.42, 0.0), 58.0)
+            scene = set_scene((1.4, 0.85, 2.6), (0.02, 0.44, 0.0), 78.0)
             material = scene.add_material("/ice", fz.ice_preset(name, age=age, spacing=0.02))
             scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), material, lifted(0.44))
             row.append(picture(scene, size, size, samples))
@@ -134,7 +134,7 @@ def breath(size: int, samples: int) -> np.ndarray:
     mesh = to_mesh(contour(block, *block.bounds(), 0.022).largest_piece())
     pictures = []
     for volume in (0.0, 1.0):
-        scene = set_scene((1.5, 1.05, 2.6), (0.0, 0.42, 0.0), 58.0)
+        scene = set_scene((1.4, 0.85, 2.6), (0.02, 0.44, 0.0), 78.0)
         material = scene.add_material("/ice", fz.ice_preset("fresh_breath", age=0.35, spacing=0.02, volume=volume))
         scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), material, lifted(0.44))
         pictures.append(picture(scene, size, size, samples))

@@ -4,8 +4,8 @@
     python examples/materials.py models -o out/materials_models.png
 
 `surface`: a block of ice, plain; with a normal map; displaced by the image that the map is made of; by Frazil's cells.
-`models`: above, translucent ice by frazil:ice, MaterialX frazil_ice, standard_surface and open_pbr_surface; below, clear ice by
-the same four. Images, a USD stage and a MaterialX document are written beside the picture, under materials/.
+`models`: above, translucent ice by frazil:ice, MaterialX frazil_ice, standard_surface, open_pbr_surface; below, clear
+ice by the same four. Images, a USD stage and a MaterialX document are written beside the picture, under materials/.
 """
 
 import argparse

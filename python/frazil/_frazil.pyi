@@ -1509,6 +1509,9 @@ class Object:
     def asset(self) -> str: ...
 
     @property
+    def translucency_set(self) -> str: ...
+
+    @property
     def matrix(self) -> object: ...
 
     def __repr__(self) -> str: ...
@@ -1530,10 +1533,11 @@ class Scene:
     def add_material(self, path: str, model: StandardMaterial | IceMaterial) -> int:
         """Add a StandardMaterial or IceMaterial (copied); its index."""
 
-    def add_object(self, path: str, mesh: int, material: int, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, asset: str = '') -> int:
+    def add_object(self, path: str, mesh: int, material: int, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, asset: str = '', translucency_set: str = '') -> int:
         """
         Place a mesh by a (4, 4) float64 matrix for row vectors, None = identity; the object's index.
-        `asset` is what it belongs to, for Cryptomatte; '' = itself.
+        `asset` is what it belongs to, for Cryptomatte; '' = itself. Ice of one `translucency_set` shares its light as
+        one body; '' = by itself.
         """
 
     def add_light(self, light: Light) -> int:
@@ -1692,6 +1696,12 @@ class RenderOptions:
 
     @lpes.setter
     def lpes(self, arg: Sequence[tuple[str, str]], /) -> None: ...
+
+    @property
+    def mattes(self) -> list[tuple[str, list[int]]]: ...
+
+    @mattes.setter
+    def mattes(self, arg: Sequence[tuple[str, Sequence[int]]], /) -> None: ...
 
     @property
     def tolerance(self) -> float: ...

@@ -66,6 +66,8 @@ def layers_of(names: Iterable[str], film: Mapping[str, Any]) -> list[str]:
         own_name = re.escape(name)
         if name.startswith(("translucency_ramp", "compensation_")):
             own_name = f"(?:indirect_)?{own_name}|indirect_translucency"
+        if name in ("matte", "refracted_matte"):
+            own_name += r"(?:\.\w+)?"
         if name == "overlay":
             own_name = r"overlay_\w+"
         pattern = re.compile(rf"(?:{own_name})\d*({'|'.join(map(re.escape, tails))})")

@@ -25,7 +25,7 @@ import numpy as np
 from . import _frazil
 from ._frazil import Bake
 from .content import content_hash, scene_hash
-from .replacing import replacing
+from .replacing import DAMAGED_ARCHIVE, replacing
 from .stoppable import Progress, run_stoppable
 from .warning import FrazilWarning
 
@@ -151,7 +151,7 @@ def refresh_bake(
     if Path(path).exists():
         try:
             known, old = _read(path, hashes)
-        except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError) as error:
+        except (*DAMAGED_ARCHIVE, OSError) as error:
             if not _is_ours(path):
                 raise OSError(
                     f"{path}: bake cache must be a file that Frazil wrote, got another. Name another file."
@@ -181,7 +181,7 @@ def load_bake(path: str | os.PathLike) -> Bake:
     """
     try:
         return _read(path, None)[0]
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
+    except DAMAGED_ARCHIVE as error:
         raise OSError(
             f"{path}: bake must be a whole file of Frazil's, got a damaged or foreign one ({error})."
         ) from error

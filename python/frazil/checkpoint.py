@@ -7,14 +7,13 @@ Not: bakes, which are made anew or come from their cache.
 """
 
 import os
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .content import content_hash, scene_hash
-from .replacing import replacing
+from .replacing import DAMAGED_ARCHIVE, replacing
 
 __all__ = ["Checkpoint"]
 
@@ -57,7 +56,7 @@ class Checkpoint:
             with np.load(self.path, allow_pickle=False) as archive:
                 state = {name: archive[name] for name in archive.files}
                 key = str(state.pop("key"))
-        except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
+        except DAMAGED_ARCHIVE as error:
             message = f"{self.path}: checkpoint must be a whole file of Frazil's, got another ({error})."
             raise OSError(f"{message} Delete it and render without resuming.") from error
         if key != self._key:

@@ -77,7 +77,7 @@ ICE_PRESETS: dict[str, IcePreset] = {
     "fresh_breath": IcePreset(
         "just frozen: clear, a breath of frost on it, light scattered once inside",
         (1.1, 1.1, 1.1),
-        (0.75, 0.13, 0.04),
+        (0.60, 0.15, 0.04),
         {"roughness": 0.06, "refraction_roughness": 0.10, "volume": 1.0, "anisotropy": 0.3},
         (
             _cracks(age_begin=0.25, age_end=1.0, amount=0.4),
@@ -88,14 +88,14 @@ ICE_PRESETS: dict[str, IcePreset] = {
     "arctic_blue": IcePreset(
         "dense and blue, old air pressed out; planes of fracture",
         (3.0, 3.0, 3.0),
-        (2.2, 0.42, 0.10),
+        (2.2, 0.55, 0.10),
         {"roughness": 0.12, "refraction_roughness": 0.16},
         (_cracks(), _cells(opacity=0.6), _frost(amount=0.36), _snow(age_begin=0.6)),
     ),
     "old_glacier": IcePreset(
         "bubbly, with bands of dirt, frosted cracks and snow",
         (14.0, 14.0, 14.0),
-        (2.4, 0.46, 0.13),
+        (2.4, 0.56, 0.13),
         {"roughness": 0.3},
         (_dirt(), _cracks(opacity=0.95), _cells(size=0.22, width=0.007, feather=0.012, amount=0.6), _frost(), _snow()),
     ),

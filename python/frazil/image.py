@@ -333,6 +333,8 @@ def _opened(path: str | os.PathLike) -> Iterator[Any]:
 
 def _layer_of(channel: str) -> str:
     layer, _, letter = channel.rpartition(".")
+    if layer in ("matte", "refracted_matte"):
+        return channel  # one channel per matte: each is a layer
     if layer:
         return layer
     return "beauty" if letter in ("R", "G", "B", "A") else letter

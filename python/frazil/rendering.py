@@ -25,6 +25,7 @@ from .checkpoint import Checkpoint
 from .cryptomatte import scene_headers
 from .denoise import check_denoiser, denoise_film
 from .film import Film
+from .mattes import resolve_mattes
 from .stoppable import Progress, run_stoppable
 from .version import version
 from .warning import FrazilWarning
@@ -56,6 +57,7 @@ def render(
     pixel_filter: str = "blackman_harris",
     aovs: Sequence[str] = (),
     lpes: Mapping[str, str] | None = None,
+    mattes: Mapping[str, Sequence[str]] | None = None,
     bake: Bake | None = None,
     bake_cache: str | os.PathLike | None = None,
     denoise: bool = False,
@@ -110,6 +112,9 @@ def render(
         Layers of the AOV table to make beside those that are made anyway; see docs/aovs.md.
     lpes : mapping of str to str
         Light path expressions: a layer's name and what it keeps, as in ``{"ice_of_rim": "C<TD>.*<L.'rim'>"}``.
+    mattes : mapping of str to sequence of str
+        Sets of objects by name, as paths at or above them, beside those of the stage's collections: each gets a layer
+        ``matte.NAME`` and one ``refracted_matte.NAME``.
     bake : Bake, optional
         Of this very scene (`frazil.bake`); without one the render bakes.
     bake_cache : path-like, optional
@@ -140,7 +145,7 @@ def render(
     MemoryError
         Where the picture would not fit into the memory that is free.
     KeyError
-        For an unknown AOV; the message has the nearest.
+        For an unknown AOV or object of a matte; the message has the nearest.
     KeyboardInterrupt
         On Ctrl-C, at the next tile.
 
@@ -171,6 +176,7 @@ def render(
         "filter": pixel_filter,
         "aovs": chosen_aovs(aovs),
         "lpes": list((lpes or {}).items()),
+        "mattes": resolve_mattes(scene, mattes),
     }
     _refuse_what_cannot_fit(*resolution)
     if resume and checkpoint is None:
@@ -198,8 +204,10 @@ def render(
     stats = _both(bake_stats, result.stats)
     for message in result.stats["warnings"]:
         warnings.warn(message, FrazilWarning, stacklevel=2)
+    paths = [item.path for item in scene.objects]
+    names_of_mattes = {name: [paths[i] for i in members] for name, members in options["mattes"]} or None
     metadata = (
-        _provenance(scene, options | {"lpes": dict(lpes or {})}, stats)
+        _provenance(scene, options | {"lpes": dict(lpes or {}), "mattes": names_of_mattes}, stats)
         | _what_layers_hold(result)
         | scene_headers(scene, aovs)
     )

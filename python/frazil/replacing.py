@@ -9,10 +9,21 @@ Not: locks; of two writers of one file the later wins, whole.
 import contextlib
 import os
 import socket
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["check_writable", "replacing"]
+__all__ = ["DAMAGED_ARCHIVE", "check_writable", "replacing"]
+
+# What zipfile and numpy raise where an archive of arrays is damaged or not ours: also for what a damaged header
+# says of encryption, methods and sizes.
+DAMAGED_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, SyntaxError, NotImplementedError, RuntimeError,
+    KeyError, ValueError, EOFError, OverflowError, MemoryError, TypeError,
+)  # fmt: skip
 
 
 @contextlib.contextmanager

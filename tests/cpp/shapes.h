@@ -33,6 +33,18 @@ inline Mesh sphere(float radius, int levels) {
     return mesh;
 }
 
+// A box between two corners, facing outwards.
+inline Mesh box_of(const V3f& low, const V3f& high) {
+    Mesh box;
+    for (const float z : {low.z, high.z}) {
+        box.positions.insert(box.positions.end(),
+                             {{low.x, low.y, z}, {high.x, low.y, z}, {high.x, high.y, z}, {low.x, high.y, z}});
+    }
+    box.triangles = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                     {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+    return box;
+}
+
 // A square of the given half side in the plane y = height, facing +y.
 inline Mesh floor_square(float half, float height) {
     Mesh mesh;

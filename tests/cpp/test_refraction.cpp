@@ -139,12 +139,7 @@ TEST_CASE("white furnace: clear, cloudy and bubbly ice without absorption is inv
 
 TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) between two boundaries") {
     // A box 0.4 m thick; the camera looks along its normal at a white sky.
-    Mesh box;
-    for (const float z : {-0.2f, 0.2f}) {
-        box.positions.insert(box.positions.end(), {{-9, -9, z}, {9, -9, z}, {9, 9, z}, {-9, 9, z}});
-    }
-    box.triangles = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
-                     {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
+    const Mesh box = box_of({-9, -9, -0.2f}, {9, 9, 0.2f});
     const Rgb sigma_a(3.0f, 1.0f, 0.1f);
     Scene scene = scene_of(box, clear_ice(sigma_a, 1.31f, 0.0f));
     model(scene).translucency = 0.0f;
@@ -261,4 +256,73 @@ TEST_CASE("light through clear ice makes no sparks: no place behind it gets more
     CHECK(most <= bare * 1.001);
     CHECK(least > 0.3 * bare);
     CHECK(least < 0.97 * bare);
+}
+
+TEST_CASE(
+    "mattes: a rock that half covers the view behind a clear slab has the slab's transmittance, and half directly") {
+    // A slab 0.4 m thick before a dark wall that ends in the middle of the picture.
+    Mesh slab = box_of({-9, -9, -0.2f}, {9, 9, 0.2f});
+    Mesh wall;
+    wall.positions = {{-9, -9, -1}, {0, -9, -1}, {0, 9, -1}, {-9, 9, -1}};
+    wall.triangles = {{0, 1, 2}, {0, 2, 3}};
+    Scene scene = scene_of(slab, clear_ice(Rgb(1.0f), 1.31f, 0.0f));
+    model(scene).translucency = 0.0f;
+    scene.meshes.push_back(wall);
+    scene.mesh_paths.push_back("/wall");
+    scene.materials.push_back({"/rock", StandardMaterial()});
+    scene.objects.push_back({"/wall", 1, 1, M44f()});
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.focal_length = 2000.0f;
+    RenderOptions options = small();
+    options.width = options.height = 8;
+    options.samples = 1024;
+    options.spacing = 2.0f;
+    options.mattes = {{"rock", {1}}, {"ice", {0}}, {"all", {0, 1}}, {"none", {}}};
+    const Film film = render(scene, options).film;
+    const auto mean = [&](const char* layer) {
+        double sum = 0.0;
+        for (const float value : film.layers.at(layer).pixels) sum += value;
+        return sum / 64;
+    };
+    // Both boundaries and all reflections between them; an even number of which leads to the wall.
+    const double f = fresnel_dielectric(1.0f, 1.31f), t = std::exp(-0.4);
+    const double through = (1 - f) * (1 - f) * t / (1 - f * f * t * t);
+    CHECK(mean("refracted_matte.rock") == doctest::Approx(0.5 * through).epsilon(0.02));
+    CHECK(mean("matte.rock") == 0.0);
+    CHECK(mean("matte.ice") == 1.0);
+    CHECK(mean("matte.all") == 1.0);
+    CHECK(mean("refracted_matte.all") == doctest::Approx(0.5 * through).epsilon(0.02));
+    CHECK(mean("refracted_matte.none") == 0.0);
+    // Each half for itself, and half directly without the slab.
+    CHECK(double(pixel(film, "refracted_matte.rock", 0, 4)[0]) == doctest::Approx(through).epsilon(0.05));
+    CHECK(pixel(film, "refracted_matte.rock", 7, 4)[0] == 0.0f);
+    scene.objects[0].local_to_world[3][0] = 100.0f;
+    const Film bare = render(scene, options).film;
+    double direct = 0.0;
+    for (const float value : bare.layers.at("matte.rock").pixels) direct += value;
+    CHECK(direct / 64 == doctest::Approx(0.5).epsilon(0.02));
+    options.mattes = {{"rock", {7}}};
+    CHECK_THROWS_WITH_AS(render(scene, options), "matte rock: objects must be in 0..2 (exclusive), got 7.", ValueError);
+}
+
+TEST_CASE("a matte of ice behind ice has what its core answers for") {
+    // Cloudy ice that clear ice of the same index runs into: no boundary between them.
+    Scene scene = scene_of(box_of({-9, -9, -0.3f}, {9, 9, 0.2f}), clear_ice(Rgb(1e-6f), 1.31f, 0.0f));
+    model(scene).translucency = 0.0f;
+    scene.meshes.push_back(box_of({-9, -9, -6.2f}, {9, 9, -0.2f}));
+    scene.mesh_paths.push_back("/behind");
+    scene.materials.push_back(ice(Rgb(1e-6f), 1.31f, 0.0f, CompensationMode::conserve));
+    scene.objects.push_back({"/behind", 1, 1, M44f()});
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.focal_length = 2000.0f;
+    RenderOptions options = small();
+    options.width = options.height = 4;
+    options.samples = 256;
+    options.spacing = 2.0f;
+    options.mattes = {{"behind", {1}}};
+    const Film film = render(scene, options).film;
+    const double f = fresnel_dielectric(1.0f, 1.31f);
+    double sum = 0.0;
+    for (const float value : film.layers.at("refracted_matte.behind").pixels) sum += value;
+    CHECK(sum / 16 == doctest::Approx(1 - f).epsilon(0.01));
 }

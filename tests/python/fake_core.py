@@ -68,6 +68,7 @@ class Core:
             light_groups=["key", ""],
             ramp_knots=[],
             compensations=[],
+            overlays=[],
         )
 
 

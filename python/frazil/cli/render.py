@@ -106,6 +106,14 @@ def render_command(
         list[str] | None,
         typer.Option(metavar="NAME=EXPRESSION", help="Write a layer of a light path expression, as in ice=C<TD>.*"),
     ] = None,
+    matte: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=PATH,PATH",
+            help="Write how much of each pixel shows these objects, directly and through ice: layers matte.NAME and "
+            "refracted_matte.NAME; beside the stage's collections matte:NAME.",
+        ),
+    ] = None,
     aov: Annotated[
         list[str] | None,
         typer.Option(
@@ -156,7 +164,8 @@ def render_command(
     within("--bake-samples", bake_samples, 1, 2**20)
     within("--bake-bounces", bake_bounces, 0, 64)
     layers = _chosen_layers(aov)
-    expressions = _expressions(lpe)
+    expressions = _named("--lpe", lpe, "EXPRESSION")
+    mattes = {name: paths.split(",") for name, paths in _named("--matte", matte, "PATH,PATH").items()}
     jobs = _jobs(output, png, no_png, frame, frames)
     refuse_unreadable(scene)
     for _, exr, preview in jobs:
@@ -206,6 +215,7 @@ def render_command(
             if chosen and "motion" in chosen:
                 add_motion(loaded)
             options["lpes"] = expressions | _authored_lpes(loaded)
+            options["mattes"] = mattes
             if checkpoint is not None or resume:
                 saved = _checkpoint_of(exr)
                 options |= {"checkpoint": saved, "resume": resume and saved.exists()}
@@ -214,7 +224,10 @@ def render_command(
 
             start = time.perf_counter()
             film.save(
-                exr, compression, layers=chosen and [*layers_of(chosen, film), *options["lpes"]], multipart=multipart
+                exr,
+                compression,
+                layers=chosen and [*layers_of(chosen, film), *options["lpes"], *_mattes_of(film, chosen)],
+                multipart=multipart,
             )
             if preview is not None:
                 film.save_preview(preview)
@@ -247,17 +260,23 @@ def _chosen_layers(aov: list[str] | None) -> list[str] | None:
     return list(dict.fromkeys(["beauty", *_without_all(names)]))
 
 
-def _expressions(lpe: list[str] | None) -> dict[str, str]:
-    """The expressions of `--lpe` by layer."""
-    expressions: dict[str, str] = {}
-    for text in lpe or []:
-        name, separator, expression = text.partition("=")
-        if not (name and separator and expression):
-            raise misused("--lpe", f"must be NAME=EXPRESSION, got '{text}'.")
-        if name in expressions:
-            raise misused("--lpe", f"must name each layer once, got '{name}' twice.")
-        expressions[name] = expression
-    return expressions
+def _named(option: str, texts: list[str] | None, what: str) -> dict[str, str]:
+    """What `--lpe` and `--matte` give, by layer."""
+    given: dict[str, str] = {}
+    for text in texts or []:
+        name, separator, value = text.partition("=")
+        if not (name and separator and value):
+            raise misused(option, f"must be NAME={what}, got '{text}'.")
+        if name in given:
+            raise misused(option, f"must name each layer once, got '{name}' twice.")
+        given[name] = value
+    return given
+
+
+def _mattes_of(film: Any, chosen: list[str]) -> list[str]:
+    """The layers of mattes: whoever names a set wants to see it."""
+    kinds = [kind for kind in ("matte", "refracted_matte") if kind not in chosen]
+    return [layer for layer in film if layer.partition(".")[0] in kinds]
 
 
 def _authored_lpes(loaded: Any) -> dict[str, str]:

@@ -44,6 +44,10 @@ class StageWalker:
             self._place(prim, matrix[None], [str(prim.GetPath())], inside=())
         self._lights.add_to_scene()
 
+    def mattes(self) -> dict[str, list[int]]:
+        """The objects of the stage's collections ``matte:NAME``, by NAME; after walk()."""
+        return self._links.mattes()
+
     def _leaves(self, root: Usd.Prim, predicate) -> Iterator[Usd.Prim]:
         """Geometry, lights and PointInstancers under (and at) root that are visible and of a wanted purpose."""
         context = self._context
@@ -119,7 +123,7 @@ class StageWalker:
         parts = self._mesh_parts(prim, texcoord_name, displacements, metres_per_unit)
         if not parts:
             return
-        asset = _asset_of(prim)
+        asset, together = _asset_of(prim), _translucency_set_of(prim)
         for matrix, path, is_flat in zip(matrices, paths, are_singular(matrices), strict=True):
             if is_flat:
                 self._context.warn(path, "its transform cannot be inverted (a scale of 0?). It is left out.")
@@ -127,7 +131,7 @@ class StageWalker:
             for mesh, subset in parts:
                 name = f"{path}/{subset}" if subset else path
                 matrix = np.ascontiguousarray(matrix)
-                index = self._scene.add_object(name, mesh, materials[subset].index, matrix, asset)
+                index = self._scene.add_object(name, mesh, materials[subset].index, matrix, asset, together)
                 own = [prim.GetPath().AppendChild(subset)] if subset else []
                 self._links.add_object([*own, prim.GetPath(), *reversed([Sdf.Path(name) for name in inside])])
                 if is_light(prim):
@@ -246,6 +250,17 @@ class StageWalker:
             is_known &= np.asarray(mask, dtype=bool)
         numbers = np.flatnonzero(is_known)
         return numbers, own[numbers], prototypes[numbers]
+
+
+def _translucency_set_of(prim: Usd.Prim) -> str:
+    """The set whose ice shares its light: ``frazil:translucencySet`` of the prim or the nearest above that has one."""
+    above = prim
+    while above and not above.IsPseudoRoot():
+        value = above.GetAttribute("frazil:translucencySet").Get()
+        if value:
+            return str(value)
+        above = above.GetParent()
+    return ""
 
 
 def _asset_of(prim: Usd.Prim) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from pxr import Sdf, Usd, UsdLux
@@ -32,6 +33,25 @@ class LinkReader:
     def casters_of(self, prim: Usd.Prim) -> ObjectSet | None:
         """The objects that cast shadows in a light; None for all."""
         return self._members(prim, UsdLux.LightAPI(prim).GetShadowLinkCollectionAPI(), "shadowLink")
+
+    def mattes(self) -> dict[str, list[int]]:
+        """The objects of the stage's collections ``matte:NAME``, on whichever prim, by NAME."""
+        found: dict[str, list[int]] = {}
+        for prim in self._context.stage.TraverseAll():
+            for schema in prim.GetAppliedSchemas():
+                kind, _, name = schema.partition(":")
+                if kind != "CollectionAPI" or not name.startswith("matte:"):
+                    continue
+                matte = name.removeprefix("matte:")
+                if not re.fullmatch(r"[A-Za-z0-9_]+", matte):
+                    self._context.warn(
+                        prim.GetPath(), f"collection {name} must end in letters, digits and _. It is left out."
+                    )
+                    continue
+                members = self._members(prim, Usd.CollectionAPI(prim, name), name)
+                own = range(len(self._objects)) if members is None else members.objects
+                found[matte] = sorted({*found.get(matte, ()), *own})
+        return found
 
     def _members(self, prim: Usd.Prim, collection: Usd.CollectionAPI, name: str) -> ObjectSet | None:
         if not collection:

@@ -32,6 +32,8 @@ class UsdScene(Scene):
         The time code that was read; None for default values.
     render_settings : RenderSettings or None
         Resolution, camera and products, where the stage has them.
+    mattes : dict of str to list of int
+        Objects of the collections ``matte:NAME``, by NAME.
     warnings : list of str
         Everything that was left out or replaced, each beginning with a prim's path.
     """
@@ -39,6 +41,7 @@ class UsdScene(Scene):
     file: str
     frame: float | None
     render_settings: RenderSettings | None
+    mattes: dict[str, list[int]]
     warnings: list[str]
 
 
@@ -97,7 +100,9 @@ def load_usd(
     if materials is not None:
         override_materials(context, os.fspath(materials), look)
     scene = UsdScene()
-    StageWalker(context, scene).walk()
+    walker = StageWalker(context, scene)
+    walker.walk()
+    scene.mattes = walker.mattes()
     if not scene.objects:
         context.warn(context.file, "has no geometry that can be rendered.")
     if not scene.lights:

@@ -202,6 +202,7 @@ void bind_options(nb::module_& module) {
         .def_rw("bake_bounces", &RenderOptions::bake_bounces)
         .def_rw("aovs", &RenderOptions::aovs)
         .def_rw("lpes", &RenderOptions::lpes)
+        .def_rw("mattes", &RenderOptions::mattes)
         .def_prop_rw(
             "tolerance", [](const RenderOptions& self) { return self.gather.tolerance; },
             [](RenderOptions& self, float tolerance) { self.gather.tolerance = tolerance; })

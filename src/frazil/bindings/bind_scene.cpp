@@ -104,6 +104,7 @@ void bind_scene(nb::module_& module) {
         .def_ro("mesh", &Object::mesh)
         .def_ro("material", &Object::material)
         .def_ro("asset", &Object::asset)
+        .def_ro("translucency_set", &Object::translucency_set)
         .def_prop_ro("matrix", [](const Object& object) { return from_matrix(object.local_to_world); })
         .def("__repr__", [](const Object& object) {
             return str("Object(", object.path, ", mesh ", object.mesh, ", material ", object.material, ")");
@@ -132,15 +133,17 @@ void bind_scene(nb::module_& module) {
         .def(
             "add_object",
             [](Scene& scene, const std::string& path, int mesh, int material, const std::optional<MatrixArray>& matrix,
-               const std::string& asset) {
+               const std::string& asset, const std::string& translucency_set) {
                 scene.objects.push_back({path, check_index(mesh, scene.meshes.size(), path, "mesh"),
                                          check_index(material, scene.materials.size(), path, "material"),
-                                         to_matrix_or_identity(matrix), asset});
+                                         to_matrix_or_identity(matrix), asset, translucency_set});
                 return int(scene.objects.size()) - 1;
             },
-            "path"_a, "mesh"_a, "material"_a, "matrix"_a = nb::none(), "asset"_a = "",
+            "path"_a, "mesh"_a, "material"_a, "matrix"_a = nb::none(), "asset"_a = "", "translucency_set"_a = "",
             "Place a mesh by a (4, 4) float64 matrix for row vectors, None = identity; the object's index.\n"
-            "`asset` is what it belongs to, for Cryptomatte; '' = itself.")
+            "`asset` is what it belongs to, for Cryptomatte; '' = itself. Ice of one `translucency_set` shares its "
+            "light as\n"
+            "one body; '' = by itself.")
         .def(
             "add_light",
             [](Scene& scene, const Light& light) {
@@ -153,7 +156,11 @@ void bind_scene(nb::module_& module) {
             "triangle_emission",
             [](const Scene& scene, int index) -> nb::object {
                 const std::uint32_t object = check_index(index, scene.objects.size(), "Scene", "object");
-                const std::vector<Rgb> values = triangle_emission(scene, object);
+                std::vector<Rgb> values;
+                {
+                    nb::gil_scoped_release released;  // a texture that is read now may ask for it
+                    values = triangle_emission(scene, object);
+                }
                 if (values.empty()) return nb::none();
                 auto* memory = new std::vector<Rgb>(values);
                 nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<Rgb>*>(p); });

@@ -25,7 +25,7 @@ PointSet points_on(const PointSet& points, const Mesh& pose, bool thin_walls = t
 // make(mesh), or for a mesh with a rest pose make(rest pose) moved to the mesh, so that its points are those of every pose.
 template <class Make>
 PointSet place_in_rest(const Mesh& mesh, bool thin_walls, const Make& make) {
-    if (mesh.rest.empty()) return make(mesh);
+    if (mesh.rest.empty() || mesh.rest == mesh.positions) return make(mesh);
     check_mesh(mesh, "Mesh");
     return points_on(make(rest_pose(mesh)), mesh, thin_walls);
 }

@@ -7,6 +7,7 @@
 #include "frazil/render/interior.h"
 #include "frazil/render/stopwatch.h"
 #include "frazil/render/thickness.h"
+#include "frazil/render/translucency_sets.h"
 #include "frazil/translucency/half_space.h"
 
 namespace frazil {
@@ -70,10 +71,10 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
 }
 
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
-                                                     const RayScene& ray_scene) {
+                                                     const RayScene& ray_scene, const Shells* shells) {
     if (points.size() == 0) return nullptr;
     return std::make_unique<const PointTree>(
-        points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once), 1, body.profile);
+        points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once, shells), 1, body.profile);
 }
 
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
@@ -106,18 +107,27 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene, bool wants_depth,
-                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
+    const TranslucencySets sets(scene, ray_scene, bodies, lit);
+    stats.warnings.insert(stats.warnings.end(), sets.warnings().begin(), sets.warnings().end());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
-        const Body& body = *bodies[i];
-        bodies[i]->tree = std::make_unique<const PointTree>(lit[i].points, lit[i].irradiance, groups, body.profile,
-                                                            body.material->ramp);
-        if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
-            bodies[i]->thickness = make_thickness_tree(body, lit[i].points, ray_scene);
-        }
         bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
+        const Body& body = *bodies[i];
+        if (!sets.is_leader(i)) {
+            bodies[i]->tree = bodies[sets.leader(i)]->tree;
+            bodies[i]->thickness = bodies[sets.leader(i)]->thickness;
+            continue;
+        }
+        const PointSet& points = sets.points(i);
+        bodies[i]->tree = std::make_shared<const PointTree>(
+            points, sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return lit[k].irradiance; }),
+            groups, body.profile, body.material->ramp);
+        if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
+            bodies[i]->thickness = make_thickness_tree(body, points, ray_scene, sets.shells(i));
+        }
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();
     }

@@ -1,5 +1,6 @@
 // Translucent bodies: every object of ice with its boundary, its profile and the tree that sums the light of its points.
-// Model: one tree per object, of the points and light that were baked (bake.h).
+// Model: one tree per object, or per set of objects that share their light (translucency_sets.h), of the points and light
+//   that were baked (bake.h).
 // Units: metres, world space.
 // Not: light that diffuses from one body into another that it touches.
 #pragma once
@@ -13,6 +14,7 @@
 #include "frazil/material/microfacet.h"
 #include "frazil/render/options.h"
 #include "frazil/render/scene.h"
+#include "frazil/render/shells.h"
 #include "frazil/render/surface.h"
 #include "frazil/translucency/point_tree.h"
 
@@ -23,8 +25,8 @@ struct Body {
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
     Rgb total_reflectance = Rgb(0.0f);              // Rd_total
-    std::unique_ptr<const PointTree> tree;          // none where the object has no surface
-    std::unique_ptr<const PointTree> thickness;     // make_thickness_tree
+    std::shared_ptr<const PointTree> tree;          // none where the object has no surface; one for a translucency set
+    std::shared_ptr<const PointTree> thickness;     // make_thickness_tree
     std::unique_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
@@ -52,7 +54,7 @@ struct LitPoints {
 
 // A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
-                                                     const RayScene& ray_scene);
+                                                     const RayScene& ray_scene, const Shells* shells = nullptr);
 // The mean gain around each position, from such a tree; empty without one.
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options);
@@ -68,7 +70,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
 // use for it or a layer `wants_depth`. Fills points, nodes and seconds of the stats.
-void plant_trees(const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene, bool wants_depth,
-                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -7,6 +7,7 @@
 #include "frazil/lighting/bounce.h"
 #include "frazil/points/point_lookup.h"
 #include "frazil/render/stopwatch.h"
+#include "frazil/render/translucency_sets.h"
 
 namespace frazil {
 namespace {
@@ -32,11 +33,11 @@ Exitance exitance_of(const Body& body, const PointSet& points, const std::vector
 
 // Fill in what the ice that is seen sends; other surfaces are left as they are.
 void add_ice(const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<Exitance>& exitance,
-             const SurfaceResolver& resolver, std::size_t groups, std::span<const BounceHit> hits,
-             std::span<Rgb> radiance) {
+             const TranslucencySets& sets, const SurfaceResolver& resolver, std::size_t groups,
+             std::span<const BounceHit> hits, std::span<Rgb> radiance) {
     for (std::size_t i = 0; i < hits.size(); ++i) {
         const BounceHit& hit = hits[i];
-        const Exitance& sent = exitance[hit.surface.placement];
+        const Exitance& sent = exitance[sets.leader(hit.surface.placement)];
         if (!sent.lookup) continue;
         const std::uint32_t point = sent.lookup->nearest(hit.position, hit.surface.geometric_normal);
         if (point == PointLookup::kNone) continue;
@@ -75,20 +76,23 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         ray_scene, lights, [&](const BounceHit& hit) { return diffuse_albedo(resolver, hit); },
         kShadowRaysPerReflection, options.seed);
 
-    std::vector<std::vector<Rgb>> last(lit.size());   // what the last bounce brought
-    std::vector<std::vector<Rgb>> gains(lit.size());  // of thin parts
+    const TranslucencySets sets(scene, ray_scene, bodies, lit);
+    std::vector<std::vector<Rgb>> last(lit.size());   // what the last bounce brought, by object
+    std::vector<std::vector<Rgb>> gains(lit.size());  // of thin parts, by set
     for (std::size_t i = 0; i < lit.size(); ++i) {
         last[i] = lit[i].irradiance;
-        if (!bodies[i]) continue;
-        const PointSet& points = lit[i].points;
-        const auto thickness = make_thickness_tree(*bodies[i], points, ray_scene);
+        if (!bodies[i] || !sets.is_leader(i)) continue;
+        const PointSet& points = sets.points(i);
+        const auto thickness = make_thickness_tree(*bodies[i], points, ray_scene, sets.shells(i));
         gains[i] = thickness_gains(thickness.get(), points.positions.data(), points.size(), options.gather);
     }
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exitance> exitance(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].empty()) continue;
-            exitance[i] = exitance_of(*bodies[i], lit[i].points, last[i], groups, gains[i], options.gather);
+            if (last[i].empty() || !sets.is_leader(i)) continue;
+            const std::vector<Rgb> light =
+                sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return last[k]; });
+            exitance[i] = exitance_of(*bodies[i], sets.points(i), light, groups, gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].empty()) continue;
@@ -96,7 +100,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             Irradiance brought = bake_bounce(
                 lit[i].points, ray_scene, groups,
                 [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
-                    add_ice(bodies, exitance, resolver, groups, hits, radiance);
+                    add_ice(bodies, exitance, sets, resolver, groups, hits, radiance);
                     if (bounce == 0) reflected(hits, radiance);
                 },
                 [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); },

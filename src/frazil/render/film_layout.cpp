@@ -128,6 +128,29 @@ void add_lpes(const Scene& scene, std::span<const NamedLpe> lpes, FilmLayout& la
     }
 }
 
+void add_mattes(const Scene& scene, std::span<const NamedMatte> mattes, FilmLayout& layout) {
+    if (mattes.empty()) return;
+    layout.mattes_of_object.resize(scene.objects.size());
+    for (const auto& [name, objects] : mattes) {
+        const bool is_plain = !name.empty() && std::all_of(name.begin(), name.end(),
+                                                           [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+        if (!is_plain) throw ValueError(str("matte: name must be of letters, digits and _, got '", name, "'."));
+        if (std::find(layout.mattes.begin(), layout.mattes.end(), name) != layout.mattes.end()) {
+            throw ValueError(str("matte ", name, ": names must differ from each other, got this one twice."));
+        }
+        for (const std::uint32_t object : objects) {
+            if (object >= scene.objects.size()) {
+                throw ValueError(str("matte ", name, ": objects must be in 0..", scene.objects.size(),
+                                     " (exclusive), got ", object, "."));
+            }
+            auto& of_object = layout.mattes_of_object[object];
+            const auto number = static_cast<std::uint32_t>(layout.mattes.size());
+            if (of_object.empty() || of_object.back() != number) of_object.push_back(number);
+        }
+        layout.mattes.push_back(name);
+    }
+}
+
 void add_ids(const Scene& scene, FilmLayout& layout) {
     std::vector<std::uint32_t> placed(scene.meshes.size(), 0);
     for (const Object& object : scene.objects) {
@@ -181,7 +204,8 @@ std::string FilmLayout::group_name(const std::string& layer, std::size_t group) 
 }
 
 FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies,
-                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes) {
+                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes,
+                       std::span<const NamedMatte> mattes) {
     check_aovs(extra_aovs);
     FilmLayout layout;
     for (const Aov& aov : aov_table()) {
@@ -215,6 +239,7 @@ FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Bod
     }
     add_ids(scene, layout);
     add_lpes(scene, lpes, layout);
+    add_mattes(scene, mattes, layout);
     if (layout.has("overlay")) add_overlays(scene, layout);
     if (layout.has("translucency_ramp")) add_knots(scene, bodies, layout);
     for (const ModeName& named : kModes) {

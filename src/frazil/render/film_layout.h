@@ -39,6 +39,10 @@ struct FilmLayout {
     std::vector<std::string> lpe_names;
     std::vector<LpeAutomaton> lpes;
 
+    // Mattes: names, and which of them each object belongs to.
+    std::vector<std::string> mattes;
+    std::vector<std::vector<std::uint32_t>> mattes_of_object;
+
     // Planes: knots first, then modes, of translucency; then all of them once more, of the light of ice that is seen by way of
     // another lobe (diffuse, specular, refraction); and that light as rendered.
     std::vector<RampKnot> knots;
@@ -73,10 +77,13 @@ struct FilmLayout {
 
 // A name and an expression.
 using NamedLpe = std::pair<std::string, std::string>;
+// A name and the indices of objects.
+using NamedMatte = std::pair<std::string, std::vector<std::uint32_t>>;
 
 // ValueError for AOVs that are unknown or twice there, for light groups whose layers would be other layers, and for light
-// path expressions that are wrong or named like another layer.
+// path expressions that are wrong or named like another layer, for mattes that are twice there or of objects that are not.
 FilmLayout make_layout(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies,
-                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes);
+                       std::span<const std::string> extra_aovs, std::span<const NamedLpe> lpes,
+                       std::span<const NamedMatte> mattes = {});
 
 }  // namespace frazil

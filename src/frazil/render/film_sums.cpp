@@ -39,6 +39,10 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     for (const char* component : kComponentNames) components_.push_back(add_grouped(component));
     for (std::size_t p = 0; p < layout.plane_count(); ++p) planes_.push_back(add_grouped(layout.plane_name(p)));
     for (const std::string& name : layout.lpe_names) lpes_.push_back(add_layer(name, 3));
+    for (const std::string& name : layout.mattes) {
+        mattes_.push_back(add_layer("matte." + name, 1));
+        refracted_mattes_.push_back(add_layer("refracted_matte." + name, 1));
+    }
     beauty_ = utility("beauty"), depth_ = utility("Z"), object_id_ = utility("object_id");
     normal_ = utility("N"), position_ = utility("P"), coverage_ = utility("coverage"), albedo_ = utility("albedo");
     sample_count_ = utility("sample_count"), variance_ = utility("variance");
@@ -127,6 +131,10 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
     }
     if (lacking_) increase(lacking_, film_pixel, tile.lacking(tile_pixel));
     for (std::size_t i = 0; i < lpes_.size(); ++i) increase(lpes_[i], film_pixel, tile.lpe(tile_pixel, i));
+    for (std::size_t i = 0; i < mattes_.size(); ++i) {
+        mattes_[i][film_pixel] += tile.matte(tile_pixel, i, false);
+        refracted_mattes_[i][film_pixel] += tile.matte(tile_pixel, i, true);
+    }
     for (std::size_t i = 0; i < id_slots_.size(); ++i) {
         const FilmLayout::Ids& ids = layout_.ids[i];
         add_ids(tile.objects(tile_pixel, ids.seen_through), ids.of_object, &id_slots_[i][film_pixel * kIdSlots * 2]);
@@ -207,6 +215,8 @@ Film FilmSums::finish() {
             for (const GroupedLayer& layer : components_) beauty += finish_grouped(layer, i, factor);
             for (const GroupedLayer& layer : planes_) finish_grouped(layer, i, factor);
             for (float* lpe : lpes_) scale(lpe, i, factor);
+            for (float* matte : mattes_) matte[i] *= factor;
+            for (float* matte : refracted_mattes_) matte[i] *= factor;
             const float hits = beauty_[4 * i + 3];
             scale(normal_, i, hits > 0.0f ? 1.0f / hits : 0.0f);
             scale(albedo_, i, factor);

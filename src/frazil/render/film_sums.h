@@ -58,7 +58,7 @@ class FilmSums {
     const FilmLayout& layout_;
     Film film_;
     std::vector<GroupedLayer> components_, planes_;
-    std::vector<float*> lpes_;
+    std::vector<float*> lpes_, mattes_, refracted_mattes_;
     std::vector<std::vector<float>> id_slots_;  // by Cryptomatte: (pixels, kIdSlots, 2)
     float *uv_, *local_position_, *material_id_, *instance_id_, *point_spacing_, *lacking_,
         *motion_;  // null where not asked for

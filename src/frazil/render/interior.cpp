@@ -82,6 +82,12 @@ bool is_closed(const Mesh& mesh) {
     return is_closed(enclosure(mesh));
 }
 
+float outward_side(const Mesh& mesh) {
+    const Enclosure shape = enclosure(mesh);
+    if (!is_closed(shape)) return 0.0f;
+    return shape.volume > 0.0 ? 1.0f : -1.0f;
+}
+
 bool InsideOf::leave(int object) {
     for (int i = size_ - 1; i >= 0; --i) {
         if (objects_[std::size_t(i)] != object) continue;

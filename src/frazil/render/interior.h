@@ -20,6 +20,8 @@ namespace frazil {
 
 // Whether rays can tell inside from outside: the mesh is closed, but for small holes.
 bool is_closed(const Mesh& mesh);
+// What the winding's normal has to be multiplied by to point out of a closed mesh: +1 or -1; 0 for an open one.
+float outward_side(const Mesh& mesh);
 
 // The bodies that a place is inside of, in the order in which they were entered.
 class InsideOf {

@@ -34,6 +34,8 @@ struct RenderOptions {
     GatherOptions gather;
     std::vector<std::pair<std::string, std::string>> lpes;  // light path expressions: a layer's name, and what it keeps
     std::vector<std::string> aovs;                          // of the table, beside those that are made anyway
+    // Sets of objects, by name and index: each gets a layer `matte.NAME` and one `refracted_matte.NAME`.
+    std::vector<std::pair<std::string, std::vector<std::uint32_t>>> mattes;
 };
 
 struct RenderStats {

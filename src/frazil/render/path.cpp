@@ -89,6 +89,11 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
                              {depth, surface.position, surface.normal, albedo, surface.object + 1, surface.st,
                               surface.local_position, motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
             tile.add_object(path.pixel, surface.object, false);
+            if (!layout_.mattes.empty()) {
+                for (const std::uint32_t matte : layout_.mattes_of_object[surface.object]) {
+                    tile.add_matte(path.pixel, matte, false, 1.0f);
+                }
+            }
             view_axis = nullptr;
         };
         const Body* body = bodies_[surface.object].get();
@@ -123,6 +128,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             }
         }
         note_primary(shader.albedo(wo));
+        if (!is_open || crossing.to == InsideOf::kNone) add_matte(path, surface.object, Rgb(1.0f), tile);
         if (path.bounce > 0 && path.scattered == 0 && !path.has_shown) {
             path.has_shown = true;
             tile.add_object(path.pixel, surface.object, true);

@@ -70,6 +70,8 @@ class PathTracer {
     bool meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const;
     bool meet_boundary(Path& path, const Surface& surface, const Crossing& crossing, Sampler& sampler,
                        Tile& tile) const;
+    // What is seen through ice, by refraction alone: `share` of the path's weight ends at the object.
+    void add_matte(const Path& path, std::size_t object, const Rgb& share, Tile& tile) const;
     void request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const;
     void add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const;
     // What light path expressions keep.

@@ -160,8 +160,17 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     return true;
 }
 
+void PathTracer::add_matte(const Path& path, std::size_t object, const Rgb& share, Tile& tile) const {
+    if (layout_.mattes.empty() || path.bounce == 0 || path.scattered > 0) return;
+    const float weight = luminance(path.weights().refraction * share);
+    for (const std::uint32_t matte : layout_.mattes_of_object[object]) tile.add_matte(path.pixel, matte, true, weight);
+}
+
 void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const {
     if (core.body == InsideOf::kNone) return;
+    if (!core.is_primary && interiors_.is_open_to_rays(static_cast<std::uint32_t>(core.body))) {
+        add_matte(path, std::size_t(core.body), share, tile);
+    }
     const Body& body = *bodies_[std::size_t(core.body)];
     if (!body.tree || body.material->translucency == 0.0f) return;
 

@@ -53,6 +53,7 @@ bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& norma
 // A fracture plane: a thin diffuse sheet that sends half of its light to either side.
 bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, const Rgb& color, Tile& tile) const {
     const int body = interiors_.filling(path.inside);
+    add_matte(path, std::size_t(body), Rgb(1.0f), tile);
     const auto cosine_pdf = [&](const V3f& wi) { return 0.5f * kInvPi * std::abs(normal.dot(wi)); };
     if (!lights_.is_empty()) {
         const float u_pick = path.sampler.next_1d();

@@ -209,10 +209,10 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     const LightSampler lights(scene.lights);
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
-    FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes);
+    FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);
     const auto plant = [&](const std::vector<LitPoints>& lit) {
-        plant_trees(lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
+        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
         if (layout.has("overlay")) plant_overlay_trees(SurfaceResolver(scene), lit, groups.size(), bodies);
     };
     if (baked) {
@@ -246,7 +246,8 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
         do {
             const std::vector<std::size_t> open = canvas.open_tiles();
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
-                Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size());
+                Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size(),
+                          layout.mattes.size());
                 render_tile(scene, options, tracer, gathering, view_axis, filter, canvas, open[i], tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);

@@ -27,7 +27,8 @@ struct Object {
     std::uint32_t mesh = 0;
     std::uint32_t material = 0;
     M44f local_to_world;
-    std::string asset;  // what it belongs to, for Cryptomatte; empty = the object itself
+    std::string asset;             // what it belongs to, for Cryptomatte; empty = the object itself
+    std::string translucency_set;  // ice whose objects share their light as one body; empty = the object by itself
 };
 
 // How a scene goes on: its objects' transforms, the vertices of its meshes (empty where they stay) and its camera a frame

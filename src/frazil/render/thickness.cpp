@@ -13,16 +13,22 @@ constexpr int kChords = 16;
 constexpr std::uint32_t kSeed = 0x74686963U;
 
 // The mean length of cosine-distributed chords from a point inwards; infinite where one finds no other side.
-float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u, const RayScene& scene) {
+float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u, const RayScene& scene,
+                 const Shells* shells) {
     const V3f inward = -normal, origin = offset_origin(position, inward);
     const auto [s, t] = tangent_frame(inward);
     float sum = 0.0f;
     for (const V2f& v : u) {
         const V2f circle = cos_sin_turns(v.y) * std::sqrt(v.x);
-        Hit hit;
         const V3f direction = s * circle.x + t * circle.y + inward * std::sqrt(std::max(0.0f, 1.0f - v.x));
-        if (!scene.intersect({origin, direction}, hit)) return std::numeric_limits<float>::infinity();
-        sum += hit.t;
+        Hit hit;
+        if (shells) {
+            sum += shells->way_through({origin, direction});
+        } else if (scene.intersect({origin, direction}, hit)) {
+            sum += hit.t;
+        } else {
+            return std::numeric_limits<float>::infinity();
+        }
     }
     return sum / static_cast<float>(u.size());
 }
@@ -30,7 +36,7 @@ float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u,
 }  // namespace
 
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once) {
+                                const Rgb& traced_once, const Shells* shells) {
     Rgb returned(1.0f);  // A
     for (int c = 0; c < 3; ++c) {
         const double scatter = medium.sigma_s_prime[c];
@@ -43,7 +49,7 @@ std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, c
         std::vector<V2f> u(net.size());
         for (std::size_t k = begin; k < end; ++k) {
             net.draw(kSeed, static_cast<std::uint32_t>(k), u);
-            const float length = stretch * mean_chord(points.positions[k], points.normals[k], u, scene);
+            const float length = stretch * mean_chord(points.positions[k], points.normals[k], u, scene, shells);
             if (!std::isfinite(length)) continue;
             for (int c = 0; c < 3; ++c) {
                 const float most = 1.0f - returned[c], plane = returned[c] - traced_once[c];

@@ -12,12 +12,14 @@
 
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/points/point_set.h"
+#include "frazil/render/shells.h"
 #include "frazil/translucency/medium.h"
 
 namespace frazil {
 
-// (1 - a)/A per point, both less `traced_once`, what rays trace of the light of one scattering (over irradiance).
+// (1 - a)/A per point, both less `traced_once`, what rays trace of the light of one scattering (over irradiance). `shells`
+// that are one body: chords end where the last of them is left.
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once);
+                                const Rgb& traced_once, const Shells* shells = nullptr);
 
 }  // namespace frazil

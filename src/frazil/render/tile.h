@@ -68,14 +68,16 @@ struct GatherRequest {
 
 class Tile {
   public:
-    // `planes` of translucency and `lpes`, light path expressions, beside the components: see FilmLayout.
-    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0, std::size_t lpes = 0)
+    // `planes` of translucency, `lpes`, light path expressions, and `mattes` beside the components: see FilmLayout.
+    Tile(std::size_t pixels, std::size_t groups, std::size_t planes = 0, std::size_t lpes = 0, std::size_t mattes = 0)
         : groups_(groups),
           plane_count_(planes),
           lpe_count_(lpes),
+          matte_count_(mattes),
           light_(pixels * kComponentCount * groups, Rgb(0.0f)),
           planes_(pixels * planes * groups, Rgb(0.0f)),
           lpes_(pixels * lpes, Rgb(0.0f)),
+          mattes_(2 * pixels * mattes, 0.0f),
           luminance_(pixels * kSampleSubsets),
           normal_(pixels, V3f(0.0f)),
           albedo_(pixels, Rgb(0.0f)),
@@ -100,6 +102,11 @@ class Tile {
 
     void add_lpe(std::size_t pixel, std::size_t lpe, const Rgb& radiance) {
         if (is_finite(radiance)) lpes_[pixel * lpe_count_ + lpe] += radiance;
+    }
+
+    // How much of a sample shows a matte's objects; `seen_through` ice or directly.
+    void add_matte(std::size_t pixel, std::size_t matte, bool seen_through, float weight) {
+        if (std::isfinite(weight)) mattes_[(2 * pixel + (seen_through ? 1 : 0)) * matte_count_ + matte] += weight;
     }
 
     // What a sample shows first; `seen_through` ice or directly.
@@ -136,6 +143,9 @@ class Tile {
         return &planes_[(pixel * plane_count_ + plane) * groups_];
     }
     const Rgb& lpe(std::size_t pixel, std::size_t lpe) const { return lpes_[pixel * lpe_count_ + lpe]; }
+    float matte(std::size_t pixel, std::size_t matte, bool seen_through) const {
+        return mattes_[(2 * pixel + (seen_through ? 1 : 0)) * matte_count_ + matte];
+    }
     const V3f& normal(std::size_t pixel) const { return normal_[pixel]; }
     const Rgb& coverage(std::size_t pixel) const { return coverage_[pixel]; }
     const Rgb& lacking(std::size_t pixel) const { return lacking_[pixel]; }
@@ -150,8 +160,9 @@ class Tile {
     std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
   private:
-    std::size_t groups_, plane_count_, lpe_count_;
+    std::size_t groups_, plane_count_, lpe_count_, matte_count_;
     std::vector<Rgb> light_, planes_, lpes_;
+    std::vector<float> mattes_;  // (pixels, directly or through ice, mattes)
     std::vector<float> luminance_;
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;

@@ -1,0 +1,111 @@
+#include "frazil/render/translucency_sets.h"
+
+#include <map>
+
+#include "frazil/base/error.h"
+#include "frazil/base/parallel.h"
+#include "frazil/render/interior.h"
+
+namespace frazil {
+namespace {
+
+// Surfaces nearer to each other than so many spacings of the points, facing the same way, are one.
+constexpr float kSkin = 0.1f;
+
+bool can_share(const Body& a, const Body& b) {
+    const IceMaterial &x = *a.material, &y = *b.material;
+    return x.medium.sigma_s_prime == y.medium.sigma_s_prime && x.medium.sigma_a == y.medium.sigma_a &&
+           x.medium.eta == y.medium.eta && x.profile == y.profile && a.traced_once == b.traced_once &&
+           x.ramp.distances == y.ramp.distances && x.ramp.colors == y.ramp.colors &&
+           x.ramp.preserve_energy == y.ramp.preserve_energy;
+}
+
+}  // namespace
+
+TranslucencySets::TranslucencySets(const Scene& scene, const RayScene& ray_scene,
+                                   const std::vector<std::unique_ptr<Body>>& bodies, const std::vector<LitPoints>& lit)
+    : lit_(lit), leader_(scene.objects.size()) {
+    std::map<std::string, std::size_t> known;  // which union
+    std::map<std::uint32_t, float> outward;    // by mesh
+    for (std::size_t i = 0; i < leader_.size(); ++i) {
+        leader_[i] = i;
+        const Object& object = scene.objects[i];
+        if (object.translucency_set.empty() || !bodies[i] || lit[i].points.size() == 0) continue;
+        const auto [side, is_new_mesh] = outward.try_emplace(object.mesh, 0.0f);
+        if (is_new_mesh) side->second = outward_side(scene.meshes[object.mesh]);
+        if (side->second == 0.0f) {
+            warnings_.push_back(str(object.path, ": the mesh must be closed to share light with translucency set '",
+                                    object.translucency_set,
+                                    "', got open edges. It stands for itself; close its holes."));
+            continue;
+        }
+        const auto [found, is_new] = known.try_emplace(object.translucency_set, unions_.size());
+        if (is_new) unions_.push_back({i, {}, Shells(ray_scene, leader_.size()), {}, {}});
+        Union& set = unions_[found->second];
+        if (!can_share(*bodies[set.leader], *bodies[i])) {
+            warnings_.push_back(str(object.path, ": the medium must be that of ", scene.objects[set.leader].path,
+                                    " to share light with translucency set '", object.translucency_set,
+                                    "', got another. It stands for itself; bind the same material."));
+            continue;
+        }
+        leader_[i] = set.leader;
+        set.members.push_back(i);
+        const Mesh placed = transformed(scene.meshes[object.mesh], object.local_to_world);
+        set.shells.add(i, side->second, bounds(placed));
+    }
+    std::erase_if(unions_, [](const Union& set) { return set.members.size() < 2; });
+    for (Union& set : unions_) unite(set);
+}
+
+void TranslucencySets::unite(Union& set) const {
+    for (const std::size_t object : set.members) {
+        const PointSet& own = lit_[object].points;
+        std::vector<char> is_inner(own.size(), 0);
+        parallel_for(own.size(), 256, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) {
+                const V3f skin = own.normals[k] * (kSkin * static_cast<float>(own.spacing));
+                is_inner[k] = set.shells.contains(own.positions[k] + skin, object) ||
+                              set.shells.contains(own.positions[k] - skin, object, object);
+            }
+        });
+        set.points.spacing = std::max(set.points.spacing, own.spacing);
+        for (std::size_t k = 0; k < own.size(); ++k) {
+            if (is_inner[k]) continue;
+            set.points.positions.push_back(own.positions[k]);
+            set.points.normals.push_back(own.normals[k]);
+            set.points.areas.push_back(own.areas[k]);
+            set.sources.emplace_back(object, k);
+        }
+    }
+}
+
+const TranslucencySets::Union* TranslucencySets::find(std::size_t leader) const {
+    for (const Union& set : unions_) {
+        if (set.leader == leader) return &set;
+    }
+    return nullptr;
+}
+
+const PointSet& TranslucencySets::points(std::size_t leader) const {
+    const Union* set = find(leader);
+    return set ? set->points : lit_[leader].points;
+}
+
+std::vector<Rgb> TranslucencySets::united(std::size_t leader, std::size_t columns, const OfObject& values) const {
+    const Union* set = find(leader);
+    if (!set) return values(leader);
+    std::vector<Rgb> result;
+    result.reserve(set->sources.size() * columns);
+    for (const auto& [object, point] : set->sources) {
+        const std::vector<Rgb>& own = values(object);
+        for (std::size_t c = 0; c < columns; ++c) result.push_back(own[point * columns + c]);
+    }
+    return result;
+}
+
+const Shells* TranslucencySets::shells(std::size_t leader) const {
+    const Union* set = find(leader);
+    return set ? &set->shells : nullptr;
+}
+
+}  // namespace frazil

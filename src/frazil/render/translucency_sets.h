@@ -1,0 +1,57 @@
+// Sets of bodies that share their light as one: formations made of many shells that run into each other.
+// Model: the points of all members make one cloud for one tree. A point that lies inside another member is not on the
+//   surface of the union: it is left out, with its area and light. Where surfaces coincide the first member has the
+//   points. Each object stands for itself unless its `translucency_set` names a set.
+// Units: metres, world space.
+// Valid: members whose meshes are closed (interior.h) and whose media agree; others stand for themselves, with a warning.
+// Not: the seam: points beside it stand for a little area that lies inside.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "frazil/render/bodies.h"
+#include "frazil/render/shells.h"
+
+namespace frazil {
+
+class TranslucencySets {
+  public:
+    // `lit` has the points; all must outlive this.
+    TranslucencySets(const Scene& scene, const RayScene& ray_scene, const std::vector<std::unique_ptr<Body>>& bodies,
+                     const std::vector<LitPoints>& lit);
+
+    // Each begins with an object's path.
+    const std::vector<std::string>& warnings() const { return warnings_; }
+
+    // The object that stands for the set of this one: itself where it has none.
+    std::size_t leader(std::size_t object) const { return leader_[object]; }
+    bool is_leader(std::size_t object) const { return leader_[object] == object; }
+
+    // The points of a leader's set that lie on the union's surface.
+    const PointSet& points(std::size_t leader) const;
+    // Their values, (N, columns), from those of each member's own points.
+    using OfObject = std::function<const std::vector<Rgb>&(std::size_t object)>;
+    std::vector<Rgb> united(std::size_t leader, std::size_t columns, const OfObject& values) const;
+    // Null for a body by itself.
+    const Shells* shells(std::size_t leader) const;
+
+  private:
+    struct Union {
+        std::size_t leader = 0;
+        std::vector<std::size_t> members;
+        Shells shells;
+        PointSet points;
+        std::vector<std::pair<std::size_t, std::size_t>> sources;  // object and its point
+    };
+    const Union* find(std::size_t leader) const;
+    void unite(Union& set) const;
+
+    const std::vector<LitPoints>& lit_;
+    std::vector<std::size_t> leader_;
+    std::vector<Union> unions_;
+    std::vector<std::string> warnings_;
+};
+
+}  // namespace frazil
