@@ -278,10 +278,13 @@ class Medium:
     def __init__(self, sigma_s_prime: object, sigma_a: object, eta: float = 1.309999942779541) -> None: ...
 
     @staticmethod
-    def from_albedo(albedo: object, mean_free_path: object, eta: float = 1.309999942779541) -> Medium:
+    def from_albedo(albedo: object, mean_free_path: object, eta: float = 1.309999942779541, profile: str = 'dipole') -> Medium:
         """
-        The medium whose dipole has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path
+        The medium whose profile has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path
         `mean_free_path` = 1/(sigma_s_prime + sigma_a), in metres.
+
+        profile : dipole, better_dipole, normalized_diffusion, photon_beam or multiple_scattering; the last as renders
+            use it, with light of one scattering: MultipleScattering(medium, single=1).
         """
 
     @property
@@ -443,6 +446,66 @@ class Gathered:
     @property
     def coverage(self) -> NDArray[numpy.float32]: ...
 
+class Cells:
+    """
+    The surface that each point of a mesh stands for: its moments, and places spread over it.
+
+    Light that is known at the places, not at the points alone, makes the sum over a tenth of the points as smooth.
+
+    Parameters
+    ----------
+    points : PointSet of poisson_points on this mesh.
+    mesh : Mesh.
+    places : how many a cell has at most, 1 to 4096.
+    seed : of where in its piece of the cell each place lies.
+
+    Raises
+    ------
+    ValueError
+        Where the points leave a part of the mesh uncovered.
+
+    Examples
+    --------
+    >>> import frazil as fz, numpy as np
+    >>> square = fz.Mesh(np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.int32([[0, 1, 2], [0, 2, 3]]))
+    >>> points = fz.poisson_points(square, 0.1)
+    >>> cells = fz.Cells(points, square)
+    >>> light = np.where(cells.positions[:, :1] > 0.5, [3.0, 2.0, 1.0], 0.0)  # a shadow's edge
+    >>> tree = fz.PointTree(points, light, fz.Dipole(fz.Medium(10.0, 0.1)), cells=cells)
+    """
+
+    def __init__(self, points: object, mesh: Mesh, places: int = 64, seed: int = 0) -> None: ...
+
+    def __len__(self) -> int: ...
+
+    @property
+    def areas(self) -> NDArray[numpy.float32]:
+        """(N,) m²; they sum to the mesh's."""
+
+    @property
+    def centroids(self) -> NDArray[numpy.float32]:
+        """(N, 3) metres."""
+
+    @property
+    def covariances(self) -> NDArray[numpy.float32]:
+        """(N, 6) m²: xx, yy, zz, xy, xz, yz about the centroid."""
+
+    @property
+    def positions(self) -> object:
+        """(M, 3) of the places, cell after cell; metres."""
+
+    @property
+    def normals(self) -> object:
+        """(M, 3) of the places."""
+
+    @property
+    def weights(self) -> object:
+        """(M,) m²: the area that each place stands for."""
+
+    @property
+    def owners(self) -> object:
+        """(M,) uint32: the point of each place."""
+
 class PointTree:
     """
     The octree of points with their irradiance.
@@ -453,11 +516,13 @@ class PointTree:
     irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.
     profile : Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or MultipleScattering.
     ramp : Ramp, optional.
+    cells : Cells of the points, optional. Irradiance may then be that of their places, (M, 3) or (M, G, 3), which
+        the estimator noise_free needs to be as smooth with a tenth of the points.
 
     Safe to gather from by many threads at once.
     """
 
-    def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None) -> None: ...
+    def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None, cells: Cells | None = None) -> None: ...
 
     def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
         """
@@ -1750,7 +1815,13 @@ class Bake:
         (N, G, 3) float32: light that enters an object's points, per light group.
         """
 
-    def append(self, points: PointSet, irradiance: numpy.typing.ArrayLike) -> None:
+    def moments(self, index: int) -> object:
+        """
+        (N, G, 3) float32: covariance of the light, summed over channels, with the place in each point's cell;
+        None where light was baked at the points alone.
+        """
+
+    def append(self, points: PointSet, irradiance: numpy.typing.ArrayLike, moments: numpy.typing.ArrayLike | None = None) -> None:
         """Add the next object (copied)."""
 
 class RenderResult:

@@ -8,7 +8,8 @@ Valid: a file of another version of Frazil counts as changed.
 Not: trees, which are made of the points in a moment.
 
 The file is a zip archive without compression: ``manifest.json`` (format, version, hashes, light groups, object paths)
-and, for each object that is ice, ``I.points.ply`` (`PointSet.save`) and ``I.light.npy`` ((N, G, 3) float32).
+and, for each object that is ice, ``I.points.ply`` (`PointSet.save`), ``I.light.npy`` and,
+with the estimator noise_free, ``I.moments.npy`` (each (N, G, 3) float32).
 """
 
 import json
@@ -32,7 +33,7 @@ from .warning import FrazilWarning
 __all__ = ["Bake", "bake", "load_bake", "refresh_bake", "save_bake"]
 
 _FORMAT = "frazil bake"
-_VERSION = 1
+_VERSION = 2
 # What a bake depends on; other options of a render leave it as it is.
 BAKE_OPTIONS = (
     "seed",
@@ -231,6 +232,10 @@ def _write(bake: Bake, path: str | os.PathLike, hashes: dict[str, Any], objects:
             archive.write(ply, f"{i}.points.ply")
             with archive.open(f"{i}.light.npy", "w", force_zip64=True) as stream:
                 np.lib.format.write_array(stream, bake.irradiance(i))
+            moments = bake.moments(i)
+            if moments is not None:
+                with archive.open(f"{i}.moments.npy", "w", force_zip64=True) as stream:
+                    np.lib.format.write_array(stream, moments)
 
 
 def _read(path: str | os.PathLike, hashes: dict[str, Any] | None) -> tuple[Bake, dict[str, Any]]:
@@ -253,9 +258,14 @@ def _read(path: str | os.PathLike, hashes: dict[str, Any] | None) -> tuple[Bake,
                 bake.append(_frazil.PointSet(), np.zeros((0, len(kept), 3), np.float32))
                 continue
             points = _frazil.PointSet.load(archive.extract(f"{i}.points.ply", folder))
-            with archive.open(f"{i}.light.npy") as stream:
-                light = np.lib.format.read_array(stream, allow_pickle=False)
-            bake.append(points, np.ascontiguousarray(light[:, kept]))
+            arrays = []
+            for name in (f"{i}.light.npy", f"{i}.moments.npy"):
+                if name not in names:
+                    continue
+                with archive.open(name) as stream:
+                    array = np.lib.format.read_array(stream, allow_pickle=False)
+                arrays.append(np.ascontiguousarray(array[:, kept]))
+            bake.append(points, *arrays)
         return bake, own
 
 

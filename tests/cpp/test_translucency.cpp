@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <hwy/targets.h>
+
 #include <cmath>
 #include <cstring>
 
@@ -56,7 +58,22 @@ TEST_CASE("kernel table: error under 1e-4 of the albedo, weighted by the energy 
     }
 }
 
-TEST_CASE("gather kernel: SIMD equals the scalar path") {
+namespace {
+
+// Run the kernels for one instruction set, and for the best one again afterwards.
+struct OnlyTarget {
+    explicit OnlyTarget(std::int64_t target) { choose(target); }
+    ~OnlyTarget() { choose(0); }
+    static void choose(std::int64_t target) {
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    }
+};
+
+}  // namespace
+
+TEST_CASE("gather kernel: SIMD equals the scalar path, for every instruction set of this processor") {
+    std::vector<std::string> tried;
     const Profile profile = Dipole(kMedium);
     const KernelTable table = tabulate(profile);
     Ramp ramp{{0.0f, 0.05f, 0.3f}, {Rgb(1.0f, 0.0f, 0.2f), Rgb(0.3f, 1.0f, 0.5f), Rgb(2.0f)}, false};
@@ -72,26 +89,35 @@ TEST_CASE("gather kernel: SIMD equals the scalar path") {
                                 {0.1f, 0.2f, 0.3f}});
         for (std::size_t c = 0; c < 3 * groups; ++c) list.powers.push_back(0.01f * (1.0f + c) * (1.5f + p.z));
     }
-    for (const RampHinges& hinges : {RampHinges{}, hinges_of(ramp, Rgb(1.0f, 2.0f, 0.5f))}) {
-        BlockSums simd, scalar;
-        for (BlockSums* block : {&simd, &scalar}) {
-            block->lanes = 37;
-            block->clear(groups);
-            for (std::size_t lane = 0; lane < kBlockLanes; ++lane) block->x[lane] = 0.2f - 0.005f * lane;
-        }
-        add_sources(table, hinges, list, groups, simd);
-        add_sources_scalar(table, hinges, list, groups, scalar);
-        for (std::size_t lane = 0; lane < 37; ++lane) {
-            for (std::size_t c = 0; c < 3; ++c) {
-                CHECK(simd.coverage[c][lane] == doctest::Approx(scalar.coverage[c][lane]).epsilon(1e-5));
-                CHECK(simd.unshaded[c][lane] == doctest::Approx(scalar.unshaded[c][lane]).epsilon(1e-5));
+    for (const std::int64_t target : {HWY_SSSE3, HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
+        if (!(hwy::SupportedTargets() & target)) continue;
+        const OnlyTarget only(target);
+        tried.push_back(simd_target());
+        CAPTURE(tried.back());
+        for (const RampHinges& hinges : {RampHinges{}, hinges_of(ramp, Rgb(1.0f, 2.0f, 0.5f))}) {
+            BlockSums simd, scalar;
+            for (BlockSums* block : {&simd, &scalar}) {
+                block->lanes = 37;
+                block->clear(groups);
+                for (std::size_t lane = 0; lane < kBlockLanes; ++lane) block->x[lane] = 0.2f - 0.005f * lane;
             }
-            for (std::size_t c = 0; c < 3 * groups; ++c) {
-                const std::size_t at = c * kBlockLanes + lane;
-                CHECK(simd.exitance[at] == doctest::Approx(scalar.exitance[at]).epsilon(1e-4));
+            add_sources(table, hinges, list, groups, simd);
+            add_sources_scalar(table, hinges, list, groups, scalar);
+            for (std::size_t lane = 0; lane < 37; ++lane) {
+                for (std::size_t c = 0; c < 3; ++c) {
+                    CHECK(simd.coverage[c][lane] == doctest::Approx(scalar.coverage[c][lane]).epsilon(1e-5));
+                    CHECK(simd.unshaded[c][lane] == doctest::Approx(scalar.unshaded[c][lane]).epsilon(1e-5));
+                }
+                for (std::size_t c = 0; c < 3 * groups; ++c) {
+                    const std::size_t at = c * kBlockLanes + lane;
+                    CHECK(simd.exitance[at] == doctest::Approx(scalar.exitance[at]).epsilon(1e-4));
+                }
             }
         }
     }
+    // Each was really another one.
+    for (std::size_t i = 1; i < tried.size(); ++i) CHECK(tried[i] != tried[i - 1]);
+    CHECK_FALSE(tried.empty());
 }
 
 TEST_CASE("point tree: the same bits for one thread and for four") {

@@ -114,7 +114,7 @@ def test_the_file_is_what_the_docs_say(tmp_path):
     path = tmp_path / "ice.bake"
     first, _ = refreshed(ice_over_floor(), path)
     with zipfile.ZipFile(path) as archive:
-        assert set(archive.namelist()) == {"manifest.json", "0.points.ply", "0.light.npy"}
+        assert set(archive.namelist()) == {"manifest.json", "0.points.ply", "0.light.npy", "0.moments.npy"}
         with archive.open("0.light.npy") as stream:
             np.testing.assert_array_equal(np.load(stream), first)
 

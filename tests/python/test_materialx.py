@@ -209,6 +209,42 @@ def test_subsurface_has_its_color_and_radius(tmp_path):
     assert (ice.translucency, ice.refraction, ice.overlays) == (1.0, 0.0, [])
 
 
+def test_subsurface_of_both_models_is_frazil_ice_to_the_last_field(stage):
+    from frazil.content import content_hash
+
+    color, scale = Gf.Vec3f(0.78, 0.9, 0.95), Gf.Vec3f(0.3, 0.5, 0.7)
+    words = {
+        "frazil:ice": {"albedo": color, "mean_free_path": scale * 0.1, "refraction": 0.0, "roughness": 0.22},
+        "ND_standard_surface_surfaceshader": {
+            "subsurface": 1.0,
+            "subsurface_color": color,
+            "subsurface_radius": scale,
+            "subsurface_scale": 0.1,
+            "specular_IOR": 1.31,
+            "specular_roughness": 0.22,
+        },
+        "ND_open_pbr_surface_surfaceshader": {
+            "subsurface_weight": 1.0,
+            "subsurface_color": color,
+            "subsurface_radius": 0.1,
+            "subsurface_radius_scale": scale,
+            "specular_ior": 1.31,
+            "specular_roughness": 0.22,
+        },
+    }
+    for number, (kind, inputs) in enumerate(words.items()):
+        shader = bind(stage, add_quad(stage, f"/Q{number}"), kind, f"/M{number}")
+        for name, given in inputs.items():
+            shader.CreateInput(name, FLOAT if isinstance(given, float) else COLOR).Set(given)
+    scene = load(stage)
+    assert scene.warnings == []
+    models = [model_of(scene, i) for i in range(3)]
+    for model in models[1:]:
+        np.testing.assert_allclose(model.medium.sigma_a, models[0].medium.sigma_a, rtol=1e-4)
+        model.medium = models[0].medium
+        assert content_hash(model) == content_hash(models[0])
+
+
 def test_open_pbr_subsurface_is_the_same_medium(stage, tmp_path):
     inputs = (
         value("subsurface_weight", "float", "1")

@@ -33,6 +33,43 @@ def test_bubbles_and_impurities_add_up():
     np.testing.assert_allclose(dirty.sigma_a - clean.sigma_a, 0.01 * optics.to_rgb(soot), rtol=1e-3)
 
 
+def test_the_two_tables_are_those_of_the_papers_everywhere():
+    """Decades of the blue minimum: Warren's below 8e-4/m, Picard's never under 0.015/m; both rise to red."""
+    warren, picard = optics.absorption("warren2008"), optics.absorption("picard2016")
+    assert warren[:6].max() < 8e-4
+    assert picard.min() > 0.015
+    assert optics.WAVELENGTHS_NM[picard.argmin()] == pytest.approx(420, abs=15)
+    assert (np.diff(warren[5:]) > 0).all()
+
+
+def test_colour_matching_integrates_to_white():
+    """The curves weigh a flat spectrum alike, and narrow lines by their colour: red at 650 nm, blue at 450 nm."""
+    lines = np.eye(41)
+    red, blue = (optics.to_rgb(lines[np.flatnonzero(optics.WAVELENGTHS_NM == nm)[0]]) for nm in (650, 450))
+    assert red.argmax() == 0
+    assert blue.argmax() == 2
+    np.testing.assert_allclose(sum(optics.to_rgb(line) for line in lines), 1.0, rtol=1e-12)
+
+
+def test_algae_take_blue_and_red_and_leave_green():
+    red, green, blue = optics.to_rgb(optics.impurity_absorption("algae", 1e-8))
+    assert blue > 2 * green
+    peak = optics.impurity_absorption("algae", 1e-8)[optics.WAVELENGTHS_NM == 680][0]
+    assert peak > 2 * optics.impurity_absorption("algae", 1e-8)[optics.WAVELENGTHS_NM == 600][0]
+    assert red > 0
+
+
+def test_info_lists_every_medium(capsys):
+    from frazil.cli import main
+
+    assert main(["info", "--media"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "(1/m)" in lines[0]
+    assert {line.split()[0] for line in lines[1:]} == set(optics.media())
+    assert main(["info"]) == 2
+    assert main(["info", "--media", "a.usda"]) == 2
+
+
 def test_every_medium_makes_a_profile():
     media = optics.media()
     assert {"blue_glacier_ice", "breath_frost", "marble"} <= media.keys()
@@ -50,7 +87,8 @@ def test_every_medium_makes_a_profile():
         (lambda: optics.ice(-1, 1e-4), "per_m3 must be >= 0"),
         (lambda: optics.ice(1, float("nan")), "radius must be >= 0"),
         (lambda: optics.ice(1, 1e-4, soot=-1), "mass_fraction must be >= 0"),
-        (lambda: optics.impurity_absorption("algae", 1), "kind must be one of soot, dust"),
+        (lambda: optics.impurity_absorption("pollen", 1), "kind must be one of soot, dust, algae"),
+        (lambda: optics.ice(1, 1e-4, algae=float("inf")), "mass_fraction must be >= 0"),
         (lambda: optics.to_rgb(np.ones(3)), "spectrum must have shape"),
     ],
 )

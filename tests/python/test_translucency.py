@@ -71,20 +71,44 @@ def test_white_furnace(estimator):
     np.testing.assert_allclose(out.exitance[:, 0] * gain, 1.0, atol=0.02)
 
 
+PROFILES = {
+    "dipole": fz.Dipole,
+    "better_dipole": fz.BetterDipole,
+    "normalized_diffusion": fz.NormalizedDiffusion,
+    "multiple_scattering": lambda medium: fz.MultipleScattering(medium, single=1.0),
+}
+
+
+@pytest.mark.parametrize("profile", PROFILES)
 @pytest.mark.parametrize("eta", [1.0, 1.31, 1.5])
-def test_albedo_inversion_round_trip(eta):
-    albedo = np.array([0.05, 0.5, 0.9, 0.99, 0.9999, 0.0])
+def test_albedo_inversion_round_trip(eta, profile):
+    """Albedo and mean free path to a medium and back; and a medium to these and back."""
+    albedo = np.array([0.05, 0.5, 0.9, 0.99, 0.9995, 0.0])
     for three in albedo.reshape(2, 3):
         mean_free_path = np.array([0.001, 0.02, 3.0])
-        medium = fz.Medium.from_albedo(three, mean_free_path, eta=eta)
-        np.testing.assert_allclose(fz.Dipole(medium).albedo, three, rtol=1e-4)
+        medium = fz.Medium.from_albedo(three, mean_free_path, eta=eta, profile=profile)
+        np.testing.assert_allclose(PROFILES[profile](medium).albedo, three, rtol=1e-4)
         np.testing.assert_allclose(medium.mean_free_path, mean_free_path, rtol=1e-5)
+    medium = fz.Medium((30.0, 25.0, 40.0), (0.6, 0.15, 5.0), eta)
+    again = fz.Medium.from_albedo(PROFILES[profile](medium).albedo, medium.mean_free_path, eta, profile)
+    np.testing.assert_allclose(again.sigma_s_prime, medium.sigma_s_prime, rtol=1e-4)
+    np.testing.assert_allclose(again.sigma_a, medium.sigma_a, rtol=5e-4)
+
+
+def test_an_albedo_beyond_the_profile_is_refused():
+    with pytest.raises(ValueError, match="Medium: albedo must be < 0.[0-9]+ for the profile photon_beam, got 0.999"):
+        fz.Medium.from_albedo(0.999, 0.01, profile="photon_beam")
+    with pytest.raises(ValueError, match="Medium: profile must be dipole, better_dipole"):
+        fz.Medium.from_albedo(0.9, 0.01, profile="gaussian")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (dict(sigma_s_prime=(-1, 1, 1), sigma_a=0.1), "Medium: sigma_s_prime must be >= 0 and finite, got -1"),
+        (dict(sigma_s_prime=1, sigma_a=-0.1), "Medium: sigma_a must be >= 0 and finite, got -0.1"),
+        (dict(sigma_s_prime=float("inf"), sigma_a=0), "Medium: sigma_s_prime must be >= 0 and finite, got inf"),
+        (dict(sigma_s_prime=1, sigma_a=0, eta=float("nan")), r"eta must be in \[1, 4\], got nan"),
         (dict(sigma_s_prime=1, sigma_a=float("nan")), "Medium: sigma_a must be >= 0 and finite, got nan"),
         (dict(sigma_s_prime=0, sigma_a=0), "must be > 0 in every channel"),
         (dict(sigma_s_prime=1, sigma_a=0, eta=0.9), r"eta must be in \[1, 4\], got 0.9"),
@@ -96,9 +120,20 @@ def test_bad_media(arguments, message):
         fz.Medium(**arguments)
 
 
-def test_bad_albedo():
-    with pytest.raises(ValueError, match=r"albedo must be in \[0, 1\), got 1"):
-        fz.Medium.from_albedo(1.0, 0.01)
+@pytest.mark.parametrize(
+    ("albedo", "mean_free_path", "message"),
+    [
+        (1.0, 0.01, r"albedo must be in \[0, 1\), got 1"),
+        (-0.1, 0.01, r"albedo must be in \[0, 1\), got -0.1"),
+        (float("nan"), 0.01, r"albedo must be in \[0, 1\), got nan"),
+        (0.5, 0.0, "mean_free_path must be > 0 and finite, got 0"),
+        (0.5, float("inf"), "mean_free_path must be > 0 and finite, got inf"),
+    ],
+)
+@pytest.mark.parametrize("profile", ["dipole", "multiple_scattering"])
+def test_bad_albedo(albedo, mean_free_path, message, profile):
+    with pytest.raises(ValueError, match=message):
+        fz.Medium.from_albedo(albedo, mean_free_path, profile=profile)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
@@ -288,8 +323,9 @@ def test_hostile_positions(estimator):
     assert tree.gather(np.zeros((0, 3))).exitance.shape == (0, 1, 3)
     with pytest.raises(ValueError, match="positions must be finite"):
         tree.gather([[np.nan, 0, 0]])
-    with pytest.raises(ValueError, match="tolerance must be > 0"):
-        tree.gather([[0, 0, 0]], tolerance=0.0)
+    for tolerance in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="tolerance must be > 0"):
+            tree.gather([[0, 0, 0]], tolerance=tolerance)
     with pytest.raises(ValueError, match="estimator must be"):
         tree.gather([[0, 0, 0]], estimator="best")
 

@@ -94,7 +94,7 @@ def test_ice_by_albedo_has_that_albedo_and_mean_free_path(tmp_path):
     shader.CreateInput("mean_free_path", COLOR).Set(Gf.Vec3f(0.1, 0.2, 0.3))
     medium = read_model(stage)[0].medium
     np.testing.assert_allclose(1 / (medium.sigma_s_prime + medium.sigma_a), [0.01, 0.02, 0.03], rtol=1e-4)
-    np.testing.assert_allclose(fz.Dipole(medium).albedo, [0.5, 0.7, 0.9], rtol=1e-3)
+    np.testing.assert_allclose(fz.MultipleScattering(medium, 1.0).albedo, [0.5, 0.7, 0.9], rtol=1e-3)
 
 
 def test_ice_defaults_follow_the_table(stage):

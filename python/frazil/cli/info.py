@@ -17,9 +17,19 @@ _USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def info_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A USD stage, an EXR, or points (PLY).")],
+    file: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="A USD stage, an EXR, or points (PLY).", show_default=False)
+    ] = None,
+    media: Annotated[bool, typer.Option("--media", help="List the media of frazil.optics, with units.")] = False,
 ) -> None:
-    """Say what is in a USD stage, an EXR, or a file of points."""
+    """Say what is in a USD stage, an EXR, or a file of points; or list the media that are built in."""
+    if media == (file is not None):
+        raise typer.BadParameter("give a FILE, or --media without one.")
+    if media:
+        from ..optics import media_lines
+
+        print("\n".join(media_lines()))
+        return
     if not file.is_file():
         raise FileNotFoundError(f"{file}: file must exist. Check the path.")
     suffix = file.suffix.lower()

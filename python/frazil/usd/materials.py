@@ -164,7 +164,7 @@ class MaterialReader:
         if has_sigma:
             sigma_a = values["sigma_a"] or (0.0, 0.0, 0.0)
             return Medium(values["sigma_s_prime"], sigma_a, values["eta"])
-        return Medium.from_albedo(values["albedo"], values["mean_free_path"], values["eta"])
+        return Medium.from_albedo(values["albedo"], values["mean_free_path"], values["eta"], values["profile"])
 
     def _up(self) -> tuple[float, float, float]:
         """The stage's up axis, in its own frame: patterns are read in the frames of its meshes."""

@@ -311,7 +311,6 @@ class SurfaceModelReader:
             refraction=1.0 if is_transmission else 0.0,
             refraction_roughness=refraction_roughness,
             overlays=self._rest(transmission if is_transmission else subsurface),
-            age=1.0,
             tint=tint,
             normal=self._normal(),
         )

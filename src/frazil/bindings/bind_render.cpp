@@ -241,17 +241,37 @@ void bind_bake(nb::module_& module) {
             },
             "index"_a, "(N, G, 3) float32: light that enters an object's points, per light group.")
         .def(
+            "moments",
+            [](nb::handle self, std::size_t index) -> nb::object {
+                Bake& bake = nb::cast<Bake&>(self);
+                if (index >= bake.bodies.size()) throw nb::index_error();
+                LitPoints& lit = bake.bodies[index];
+                if (lit.moments.empty()) return nb::none();
+                return nb::cast(view(&lit.moments.data()->x, {lit.points.size(), bake.groups.size(), 3}, self));
+            },
+            "index"_a,
+            "(N, G, 3) float32: covariance of the light, summed over channels, with the place in each point's cell;\n"
+            "None where light was baked at the points alone.")
+        .def(
             "append",
-            [](Bake& bake, const PointSet& points, const FloatArray& irradiance) {
+            [](Bake& bake, const PointSet& points, const FloatArray& irradiance, std::optional<FloatArray> moments) {
                 if (irradiance.ndim() != 3 || irradiance.shape(0) != points.size() ||
                     irradiance.shape(1) != bake.groups.size() || irradiance.shape(2) != 3) {
                     throw ValueError(
                         str("Bake: irradiance must be of shape (", points.size(), ", ", bake.groups.size(), ", 3)."));
                 }
                 const auto* values = reinterpret_cast<const Rgb*>(irradiance.data());
-                bake.bodies.push_back({points, {values, values + points.size() * bake.groups.size()}});
+                LitPoints& lit = bake.bodies.emplace_back();
+                lit.points = points;
+                lit.irradiance.assign(values, values + points.size() * bake.groups.size());
+                if (!moments) return;
+                if (moments->size() != irradiance.size()) {
+                    throw ValueError("Bake: moments must be of the shape of irradiance, or None.");
+                }
+                const auto* first = reinterpret_cast<const V3f*>(moments->data());
+                lit.moments.assign(first, first + lit.irradiance.size());
             },
-            "points"_a, "irradiance"_a, "Add the next object (copied).")
+            "points"_a, "irradiance"_a, "moments"_a = nb::none(), "Add the next object (copied).")
         .def(
             "__init__",
             [](Bake* self, std::vector<std::string> groups) {

@@ -156,7 +156,11 @@ void bind_scene(nb::module_& module) {
             "triangle_emission",
             [](const Scene& scene, int index) -> nb::object {
                 const std::uint32_t object = check_index(index, scene.objects.size(), "Scene", "object");
-                const std::vector<Rgb> values = triangle_emission(scene, object);
+                std::vector<Rgb> values;
+                {
+                    nb::gil_scoped_release released;  // a texture that is read now may ask for it
+                    values = triangle_emission(scene, object);
+                }
                 if (values.empty()) return nb::none();
                 auto* memory = new std::vector<Rgb>(values);
                 nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<Rgb>*>(p); });

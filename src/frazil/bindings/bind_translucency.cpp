@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "frazil/bindings/bindings.h"
+#include "frazil/translucency/albedo_inversion.h"
 #include "frazil/translucency/compensation.h"
 #include "frazil/translucency/fresnel.h"
 #include "frazil/translucency/half_space.h"
@@ -82,6 +83,21 @@ PointSet to_points(nb::handle object) {
     points.areas = to_scalars(object.attr("areas"));
     if (nb::hasattr(object, "spacing")) points.spacing = nb::cast<float>(object.attr("spacing"));
     return points;
+}
+
+// Cells and what their places lie on.
+struct MeshCells {
+    Mesh mesh;
+    Cells cells;
+};
+
+// One vector of three per place.
+template <class Value>
+nb::object per_place(const MeshCells& self, const Value& value) {
+    std::vector<V3f> out(self.cells.places.size());
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = value(self.cells.places[i], self.mesh);
+    const std::size_t n = out.size();
+    return own(std::move(out), {n, 3});
 }
 
 // Irradiance (N, 3) or (N, G, 3), and its G.
@@ -166,13 +182,19 @@ void bind_translucency(nb::module_& module) {
             "sigma_s_prime"_a, "sigma_a"_a, "eta"_a = 1.31f)
         .def_static(
             "from_albedo",
-            [](nb::handle albedo, nb::handle mean_free_path, float eta) {
-                return medium_from_albedo(to_rgb(albedo, "Medium: albedo"),
-                                          to_rgb(mean_free_path, "Medium: mean_free_path"), eta);
+            [](nb::handle albedo, nb::handle mean_free_path, float eta, const std::string& profile) {
+                const ProfileKind kind = profile_named(profile, "Medium");
+                const Rgb total = to_rgb(albedo, "Medium: albedo"),
+                          path = to_rgb(mean_free_path, "Medium: mean_free_path");
+                const nb::gil_scoped_release release;
+                return medium_for_profile(kind, total, path, eta);
             },
-            "albedo"_a, "mean_free_path"_a, "eta"_a = 1.31f,
-            "The medium whose dipole has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path\n"
-            "`mean_free_path` = 1/(sigma_s_prime + sigma_a), in metres.")
+            "albedo"_a, "mean_free_path"_a, "eta"_a = 1.31f, "profile"_a = "dipole",
+            "The medium whose profile has total reflectance `albedo` (0 <= albedo < 1) and transport mean free path\n"
+            "`mean_free_path` = 1/(sigma_s_prime + sigma_a), in metres.\n\n"
+            "profile : dipole, better_dipole, normalized_diffusion, photon_beam or multiple_scattering; the last as "
+            "renders\n"
+            "    use it, with light of one scattering: MultipleScattering(medium, single=1).")
         .def_prop_ro("sigma_s_prime", [](const Medium& m) { return to_array(m.sigma_s_prime); })
         .def_prop_ro("sigma_a", [](const Medium& m) { return to_array(m.sigma_a); })
         .def_ro("eta", &Medium::eta)
@@ -267,6 +289,78 @@ void bind_translucency(nb::module_& module) {
             return view(reinterpret_cast<float*>(self.coverage.data()), {self.coverage.size(), 3}, nb::find(self));
         });
 
+    nb::class_<MeshCells>(
+        module, "Cells",
+        "The surface that each point of a mesh stands for: its moments, and places spread over it.\n\n"
+        "Light that is known at the places, not at the points alone, makes the sum over a tenth of the points as "
+        "smooth.\n\n"
+        "Parameters\n----------\n"
+        "points : PointSet of poisson_points on this mesh.\n"
+        "mesh : Mesh.\n"
+        "places : how many a cell has at most, 1 to 4096.\n"
+        "seed : of where in its piece of the cell each place lies.\n\n"
+        "Raises\n------\nValueError\n    Where the points leave a part of the mesh uncovered.\n\n"
+        "Examples\n--------\n"
+        ">>> import frazil as fz, numpy as np\n"
+        ">>> square = fz.Mesh(np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.int32([[0, 1, 2], [0, 2, "
+        "3]]))\n"
+        ">>> points = fz.poisson_points(square, 0.1)\n"
+        ">>> cells = fz.Cells(points, square)\n"
+        ">>> light = np.where(cells.positions[:, :1] > 0.5, [3.0, 2.0, 1.0], 0.0)  # a shadow's edge\n"
+        ">>> tree = fz.PointTree(points, light, fz.Dipole(fz.Medium(10.0, 0.1)), cells=cells)")
+        .def(
+            "__init__",
+            [](MeshCells* self, nb::handle points, const Mesh& mesh, int places, std::uint32_t seed) {
+                const PointSet set = to_points(points);
+                const nb::gil_scoped_release release;
+                new (self) MeshCells{mesh, cells_of(set, mesh, places, seed)};
+            },
+            "points"_a, "mesh"_a, "places"_a = 64, "seed"_a = 0)
+        .def("__len__", [](const MeshCells& self) { return self.cells.size(); })
+        .def_prop_ro(
+            "areas", [](MeshCells& self) { return view(self.cells.areas.data(), {self.cells.size()}, nb::find(self)); },
+            "(N,) m²; they sum to the mesh's.")
+        .def_prop_ro(
+            "centroids",
+            [](MeshCells& self) {
+                return view(reinterpret_cast<float*>(self.cells.centroids.data()), {self.cells.size(), 3},
+                            nb::find(self));
+            },
+            "(N, 3) metres.")
+        .def_prop_ro(
+            "covariances",
+            [](MeshCells& self) {
+                return view(reinterpret_cast<float*>(self.cells.covariances.data()), {self.cells.size(), 6},
+                            nb::find(self));
+            },
+            "(N, 6) m²: xx, yy, zz, xy, xz, yz about the centroid.")
+        .def_prop_ro(
+            "positions", [](const MeshCells& self) { return per_place(self, position_of); },
+            "(M, 3) of the places, cell after cell; metres.")
+        .def_prop_ro(
+            "normals", [](const MeshCells& self) { return per_place(self, normal_of); }, "(M, 3) of the places.")
+        .def_prop_ro(
+            "weights",
+            [](const MeshCells& self) {
+                std::vector<float> out;
+                for (const CellPlace& place : self.cells.places) out.push_back(place.area);
+                const std::size_t n = out.size();
+                return own(std::move(out), {n});
+            },
+            "(M,) m²: the area that each place stands for.")
+        .def_prop_ro(
+            "owners",
+            [](const MeshCells& self) {
+                std::vector<std::uint32_t> out;
+                for (std::uint32_t k = 0; k < self.cells.size(); ++k) {
+                    out.insert(out.end(), self.cells.first[k + 1] - self.cells.first[k], k);
+                }
+                auto* kept = new std::vector<std::uint32_t>(std::move(out));
+                nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<std::uint32_t>*>(p); });
+                return nb::cast(nb::ndarray<nb::numpy, std::uint32_t>(kept->data(), {kept->size()}, owner));
+            },
+            "(M,) uint32: the point of each place.");
+
     nb::class_<PointTree>(
         module, "PointTree",
         "The octree of points with their irradiance.\n\n"
@@ -274,19 +368,31 @@ void bind_translucency(nb::module_& module) {
         "points : PointSet, or any object with positions (N, 3), normals (N, 3) and areas (N,).\n"
         "irradiance : (N, 3) or (N, G, 3), W/m²; rows with NaN are left out and counted.\n"
         "profile : Dipole, BetterDipole, NormalizedDiffusion, PhotonBeamDiffusion or MultipleScattering.\n"
-        "ramp : Ramp, optional.\n\n"
+        "ramp : Ramp, optional.\n"
+        "cells : Cells of the points, optional. Irradiance may then be that of their places, (M, 3) or (M, G, 3), "
+        "which\n"
+        "    the estimator noise_free needs to be as smooth with a tenth of the points.\n\n"
         "Safe to gather from by many threads at once.")
         .def(
             "__init__",
-            [](PointTree* self, nb::handle points, nb::handle irradiance, nb::handle profile, const Ramp* ramp) {
+            [](PointTree* self, nb::handle points, nb::handle irradiance, nb::handle profile, const Ramp* ramp,
+               const MeshCells* cells) {
                 PointSet set = to_points(points);
                 auto [values, groups] = to_irradiance(irradiance);
                 const Profile kind = to_profile(profile);
                 const Ramp shade = ramp ? *ramp : Ramp{};
                 nb::gil_scoped_release release;
-                new (self) PointTree(set, std::move(values), groups, kind, shade);
+                if (!cells) {
+                    new (self) PointTree(set, std::move(values), groups, kind, shade);
+                    return;
+                }
+                CellMeans light{std::move(values), {}};
+                if (light.means.size() == cells->cells.places.size() * groups) {
+                    light = cell_means(cells->cells, cells->mesh, light.means, groups);
+                }
+                new (self) PointTree(set, std::move(light.means), groups, kind, shade, &cells->cells, light.moments);
             },
-            "points"_a, "irradiance"_a, "profile"_a, "ramp"_a = nb::none())
+            "points"_a, "irradiance"_a, "profile"_a, "ramp"_a = nb::none(), "cells"_a = nb::none())
         .def(
             "gather",
             [](const PointTree& self, nb::handle positions, float tolerance, const std::string& estimator,

@@ -7,6 +7,7 @@
 #include "frazil/base/random.h"
 #include "frazil/base/sampler.h"
 #include "frazil/base/trigonometry.h"
+#include "frazil/lighting/places.h"
 
 namespace frazil {
 namespace {
@@ -28,6 +29,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     Irradiance result;
     result.groups = groups;
     result.values.assign(points.size() * groups, Rgb(0.0f));
+    if (options.cells.cells) result.moments.assign(result.values.size(), V3f(0.0f));
     result.rays = std::uint64_t(points.size()) * std::uint64_t(options.samples);
     const ScrambledNet net(options.samples);
     std::atomic<std::uint64_t> dropped{0};
@@ -35,34 +37,49 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     parallel_for(points.size(), kPointsPerBatch, [&](std::size_t begin, std::size_t end) {
         // Look around from every point of the batch.
         std::vector<V2f> u(net.size());
+        std::vector<Place> places;
+        std::vector<std::uint32_t> place_of(net.size());
         std::vector<BounceHit> hits;
+        std::vector<Place> starts;              // of each hit's ray
+        std::vector<V3f> centres(end - begin);  // of each point's rays
         for (std::size_t i = begin; i < end; ++i) {
-            const V3f& normal = points.normals[i];
-            const V3f origin = offset_origin(points.positions[i], normal);
-            const auto [s, t] = tangent_frame(normal);
+            find_places(points, options.cells, std::uint32_t(i), places);
             net.draw(hash(options.seed, 0x626f756eU), std::uint32_t(i), u);
-            for (const V2f& v : u) {
-                const V2f circle = cos_sin_turns(v.y) * std::sqrt(v.x);
+            deal(places, 0, hash(options.seed, std::uint32_t(i)), place_of);
+            V3f sum(0.0f);
+            for (std::size_t k = 0; k < u.size(); ++k) {
+                const Place& place = places[place_of[k]];
+                sum += place.position - places[0].position;
+                const V2f circle = cos_sin_turns(u[k].y) * std::sqrt(u[k].x);
+                const auto [s, t] = tangent_frame(place.normal);
                 BounceHit hit;
                 hit.point = std::uint32_t(i);
-                hit.direction = s * circle.x + t * circle.y + normal * std::sqrt(std::max(0.0f, 1.0f - v.x));
+                hit.direction = s * circle.x + t * circle.y + place.normal * std::sqrt(std::max(0.0f, 1.0f - u[k].x));
+                const V3f origin = offset_origin(place.position, place.normal);
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.position = origin + hit.direction * hit.surface.t;
                 hits.push_back(hit);
+                starts.push_back(place);
             }
+            centres[i - begin] = places[0].position + sum / float(u.size());
         }
         // Ask what the surfaces send, and let it in: cosine-distributed rays leave pi T L / n.
         std::vector<Rgb> sent(hits.size() * groups, Rgb(0.0f));
         radiance(hits, sent);
         for (std::size_t i = 0; i < hits.size(); ++i) {
-            const float cosine = std::max(0.0f, hits[i].direction.dot(points.normals[hits[i].point]));
+            const float cosine = std::max(0.0f, hits[i].direction.dot(starts[i].normal));
             const float weight = kPi * transmittance(cosine) / float(options.samples);
             for (std::size_t g = 0; g < groups; ++g) {
                 const Rgb value = sent[i * groups + g] * weight;
-                if (is_finite(value)) {
-                    result.values[hits[i].point * groups + g] += value;
-                } else {
+                if (!is_finite(value)) {
                     ++dropped;
+                    continue;
+                }
+                const std::size_t at = hits[i].point * groups + g;
+                result.values[at] += value;
+                if (!result.moments.empty()) {
+                    result.moments[at] +=
+                        (starts[i].position - centres[hits[i].point - begin]) * (value.x + value.y + value.z);
                 }
             }
         }

@@ -19,6 +19,7 @@
 #include "frazil/base/progress.h"
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/light_sampling.h"
+#include "frazil/lighting/places.h"
 #include "frazil/points/point_set.h"
 
 namespace frazil {
@@ -33,6 +34,9 @@ struct IrradianceOptions {
     // or to a tenth of what would arrive if nothing were in the way, whichever is larger.
     float error = 0.0f;
     int max_rounds = 16;  // how many times `samples` a light may take at a point for that
+    // Where rays start: spread over the cell of each point, so that irradiance is a mean over what the point stands for; or,
+    // without, at the points themselves.
+    CellSource cells = {};
 };
 
 // So many lights of a group are served one by one in the bake.
@@ -40,7 +44,10 @@ inline constexpr std::size_t kCrowd = 32;
 
 struct Irradiance {
     std::size_t groups = 1;
-    std::vector<Rgb> values;    // (N, groups)
+    std::vector<Rgb> values;  // (N, groups)
+    // (N, groups), with cells: covariance of irradiance, summed over channels, with the place in the cell; W/m. Divided by
+    // the irradiance it is how far the centre of the light lies from the cell's centroid.
+    std::vector<V3f> moments;
     std::vector<float> errors;  // (N), one standard deviation of the luminance of all groups together, estimated
     std::uint64_t rays = 0;
     std::uint64_t dropped_samples = 0;  // non-finite

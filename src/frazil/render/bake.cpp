@@ -19,6 +19,8 @@ namespace {
 constexpr double kDefaultSpacing = 0.5;
 // How many points the default spacing may ask of one body, at most and at least.
 constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
+// Places of a body that the bake keeps at once, 16 bytes each.
+constexpr std::size_t kMostPlaces = 32'000'000;
 // Spacing over mean free path beyond which single points show.
 constexpr float kCoarse = 4.0f;
 // How much finer points may be where a texture is dark, which may be black by mistake.
@@ -168,11 +170,15 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
     }
 }
 
+struct EnteringLight {
+    std::vector<Rgb> irradiance;
+    std::vector<V3f> moments;
+};
+
 // Light that enters all points, by way of these lights alone.
-std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
-                                          const std::vector<std::unique_ptr<Body>>& bodies,
-                                          const RenderOptions& options, std::vector<LitPoints>& lit, RenderStats& stats,
-                                          Progress* progress) {
+std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
+                                       const std::vector<std::unique_ptr<Body>>& bodies, const RenderOptions& options,
+                                       std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress) {
     const SurfaceResolver resolver(scene);
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
@@ -181,18 +187,31 @@ std::vector<std::vector<Rgb>> bake_lights(const Scene& scene, const RayScene& ra
         IrradianceOptions bake_options{options.bake_samples, options.seed};
         bake_options.objects = {static_cast<std::uint32_t>(i)};
         bake_options.error = options.bake_error;
+        Mesh mesh;
+        if (options.gather.estimator == Estimator::noise_free) {
+            const Object& object = scene.objects[i];
+            mesh = transformed(scene.meshes[object.mesh], object.local_to_world);
+            // No more than shadow rays; fewer where points are so many that their cells are small.
+            const int places = std::clamp(static_cast<int>(kMostPlaces / lit[i].points.size()), 8,
+                                          std::clamp(options.bake_samples, 8, 256));
+            if (!lit[i].cells) lit[i].cells = std::make_shared<const Cells>(cells_of(lit[i].points, mesh, places));
+            bake_options.cells = {lit[i].cells.get(), &mesh};
+        }
         Irradiance irradiance = bake_irradiance(
             lit[i].points, ray_scene, lights,
             [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
             progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;
-        keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), irradiance.values);
+        keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), irradiance);
         lit[i].irradiance = std::move(irradiance.values);
+        lit[i].moments = std::move(irradiance.moments);
     }
     add_bounces(scene, ray_scene, lights, options, bodies, lit, stats, progress);
-    std::vector<std::vector<Rgb>> result(lit.size());
-    for (std::size_t i = 0; i < lit.size(); ++i) result[i] = std::move(lit[i].irradiance);
+    std::vector<EnteringLight> result(lit.size());
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+        result[i] = {std::move(lit[i].irradiance), std::move(lit[i].moments)};
+    }
     return result;
 }
 
@@ -201,7 +220,8 @@ std::size_t index_of(const std::vector<std::string>& names, const std::string& n
 }
 
 // Copy column `from` of (N, from_count) into column `to` of (N, to_count).
-void copy_group(const std::vector<Rgb>& source, std::size_t from, std::size_t from_count, std::vector<Rgb>& target,
+template <class Value>
+void copy_group(const std::vector<Value>& source, std::size_t from, std::size_t from_count, std::vector<Value>& target,
                 std::size_t to, std::size_t to_count) {
     for (std::size_t k = 0; k * from_count < source.size(); ++k) {
         target[k * to_count + to] = source[k * from_count + from];
@@ -233,7 +253,12 @@ Bake make_bake(const Scene& scene, const RayScene& ray_scene, const std::vector<
     }
     add_points(scene, bodies, options, bake.bodies, stats, progress);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-        if (known.bodies[i].irradiance.size() == bake.bodies[i].points.size() * known.groups.size()) continue;
+        const std::size_t values = bake.bodies[i].points.size() * known.groups.size();
+        const bool wants_moments = options.gather.estimator == Estimator::noise_free;
+        if (known.bodies[i].irradiance.size() == values &&
+            known.bodies[i].moments.size() == (wants_moments ? values : 0)) {
+            continue;
+        }
         known.groups.clear();
         break;
     }
@@ -245,7 +270,7 @@ Bake make_bake(const Scene& scene, const RayScene& ray_scene, const std::vector<
     }
     const LightSampler lights(wanted);
     const std::vector<std::string> fresh_groups = light_groups(wanted);
-    std::vector<std::vector<Rgb>> fresh(bodies.size());
+    std::vector<EnteringLight> fresh(bodies.size());
     if (!wanted.empty()) {
         fresh = bake_lights(scene, ray_scene, lights, bodies, options, bake.bodies, stats, progress);
     }
@@ -254,15 +279,26 @@ Bake make_bake(const Scene& scene, const RayScene& ray_scene, const std::vector<
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         LitPoints& lit = bake.bodies[i];
         lit.irradiance.assign(lit.points.size() * groups, Rgb(0.0f));
+        lit.moments.assign(options.gather.estimator == Estimator::noise_free ? lit.irradiance.size() : 0, V3f(0.0f));
         for (std::size_t g = 0; g < groups; ++g) {
             const std::size_t old = index_of(known.groups, bake.groups[g]);
             if (old < known.groups.size()) {
-                copy_group(known.bodies[i].irradiance, old, known.groups.size(), lit.irradiance, g, groups);
+                const std::size_t columns = known.groups.size();
+                copy_group(known.bodies[i].irradiance, old, columns, lit.irradiance, g, groups);
+                copy_group(known.bodies[i].moments, old, columns, lit.moments, g, groups);
             } else {
-                copy_group(fresh[i], index_of(fresh_groups, bake.groups[g]), fresh_groups.size(), lit.irradiance, g,
-                           groups);
+                const std::size_t from = index_of(fresh_groups, bake.groups[g]), columns = fresh_groups.size();
+                copy_group(fresh[i].irradiance, from, columns, lit.irradiance, g, groups);
+                copy_group(fresh[i].moments, from, columns, lit.moments, g, groups);
             }
         }
+    }
+    // Places are of use to the bake alone.
+    for (LitPoints& lit : bake.bodies) {
+        if (!lit.cells) continue;
+        Cells moments = *lit.cells;
+        moments.places = {};
+        lit.cells = std::make_shared<const Cells>(std::move(moments));
     }
     return bake;
 }
@@ -277,7 +313,10 @@ void check_bake(const Scene& scene, const Bake& bake) {
     }
     for (std::size_t i = 0; i < bake.bodies.size(); ++i) {
         const LitPoints& lit = bake.bodies[i];
-        if (lit.irradiance.size() == lit.points.size() * bake.groups.size()) continue;
+        if (lit.irradiance.size() == lit.points.size() * bake.groups.size() &&
+            (lit.moments.empty() || lit.moments.size() == lit.irradiance.size())) {
+            continue;
+        }
         throw ValueError(str(scene.objects[i].path, ": irradiance must be one per point and light group (",
                              lit.points.size() * bake.groups.size(), "), got ", lit.irradiance.size(), "."));
     }

@@ -107,6 +107,12 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
+std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const PointSet& points) {
+    const Object& placed = scene.objects[object];
+    return std::make_shared<const Cells>(
+        cells_of(points, transformed(scene.meshes[placed.mesh], placed.local_to_world)));
+}
+
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
                  bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
@@ -122,9 +128,17 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             continue;
         }
         const PointSet& points = sets.points(i);
+        const auto cells_of_object = [&](std::size_t k) {
+            return lit[k].cells || lit[k].moments.empty() ? lit[k].cells : cells_of_body(scene, k, lit[k].points);
+        };
+        const std::shared_ptr<const Cells> cells = sets.cells(i, cells_of_object);
+        std::vector<V3f> moments;
+        if (cells) {
+            moments = sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return lit[k].moments; });
+        }
         bodies[i]->tree = std::make_shared<const PointTree>(
             points, sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return lit[k].irradiance; }),
-            groups, body.profile, body.material->ramp);
+            groups, body.profile, body.material->ramp, cells.get(), moments);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             bodies[i]->thickness = make_thickness_tree(body, points, ray_scene, sets.shells(i));
         }

@@ -49,8 +49,13 @@ struct Body {
 // A body's points and the light that enters them.
 struct LitPoints {
     PointSet points;
-    std::vector<Rgb> irradiance;  // (N, groups)
+    std::vector<Rgb> irradiance;    // (N, groups)
+    std::vector<V3f> moments = {};  // (N, groups), as in Irradiance; empty where light was baked at the points alone
+    std::shared_ptr<const Cells> cells = nullptr;  // of the points; made anew where they are wanted and not here
 };
+
+// The cells of an object's points.
+std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const PointSet& points);
 
 // A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,

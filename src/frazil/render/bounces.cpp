@@ -20,10 +20,11 @@ struct Exitance {
     std::unique_ptr<const PointLookup> lookup;
 };
 
-Exitance exitance_of(const Body& body, const PointSet& points, const std::vector<Rgb>& irradiance, std::size_t groups,
+Exitance exitance_of(const Body& body, const PointSet& points, const Cells* cells, const Irradiance& last,
                      const std::vector<Rgb>& gains, const GatherOptions& options) {
+    const std::vector<Rgb>& irradiance = last.values;
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
-    const PointTree tree(points, irradiance, groups, body.profile);
+    const PointTree tree(points, irradiance, last.groups, body.profile, {}, cells, last.moments);
     Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
@@ -59,10 +60,12 @@ Rgb diffuse_albedo(const SurfaceResolver& resolver, const BounceHit& hit) {
 
 }  // namespace
 
-void keep_entering(const std::vector<float>& entering, std::vector<Rgb>& irradiance) {
+void keep_entering(const std::vector<float>& entering, Irradiance& irradiance) {
     if (entering.empty()) return;
-    const std::size_t groups = irradiance.size() / entering.size();
-    for (std::size_t k = 0; k < irradiance.size(); ++k) irradiance[k] *= entering[k / groups];
+    for (std::size_t k = 0; k < irradiance.values.size(); ++k) {
+        irradiance.values[k] *= entering[k / irradiance.groups];
+        if (!irradiance.moments.empty()) irradiance.moments[k] *= entering[k / irradiance.groups];
+    }
 }
 
 void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
@@ -77,11 +80,15 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         kShadowRaysPerReflection, options.seed);
 
     const TranslucencySets sets(scene, ray_scene, bodies, lit);
-    std::vector<std::vector<Rgb>> last(lit.size());   // what the last bounce brought, by object
-    std::vector<std::vector<Rgb>> gains(lit.size());  // of thin parts, by set
+    std::vector<Irradiance> last(lit.size());                     // what the last bounce brought, by object
+    std::vector<std::vector<Rgb>> gains(lit.size());              // of thin parts, by set
+    std::vector<std::shared_ptr<const Cells>> cells(lit.size());  // by set
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        last[i] = lit[i].irradiance;
+        last[i].groups = groups;
+        last[i].values = lit[i].irradiance;
+        last[i].moments = lit[i].moments;
         if (!bodies[i] || !sets.is_leader(i)) continue;
+        cells[i] = sets.cells(i, [&](std::size_t k) { return lit[k].cells; });
         const PointSet& points = sets.points(i);
         const auto thickness = make_thickness_tree(*bodies[i], points, ray_scene, sets.shells(i));
         gains[i] = thickness_gains(thickness.get(), points.positions.data(), points.size(), options.gather);
@@ -89,27 +96,40 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exitance> exitance(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].empty() || !sets.is_leader(i)) continue;
-            const std::vector<Rgb> light =
-                sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return last[k]; });
-            exitance[i] = exitance_of(*bodies[i], sets.points(i), light, groups, gains[i], options.gather);
+            if (last[i].values.empty() || !sets.is_leader(i)) continue;
+            Irradiance light;
+            light.groups = groups;
+            light.values =
+                sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return last[k].values; });
+            if (cells[i]) {
+                light.moments =
+                    sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return last[k].moments; });
+            }
+            exitance[i] = exitance_of(*bodies[i], sets.points(i), cells[i].get(), light, gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].empty()) continue;
+            if (last[i].values.empty()) continue;
             const IceMaterial& material = *bodies[i]->material;
-            Irradiance brought = bake_bounce(
+            IrradianceOptions bake_options{std::max(1, options.bake_samples / 4),
+                                           options.seed + static_cast<std::uint32_t>(bounce)};
+            Mesh mesh;
+            if (lit[i].cells) {
+                mesh = transformed(scene.meshes[scene.objects[i].mesh], scene.objects[i].local_to_world);
+                bake_options.cells = {lit[i].cells.get(), &mesh};
+            }
+            last[i] = bake_bounce(
                 lit[i].points, ray_scene, groups,
                 [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                     add_ice(bodies, exitance, sets, resolver, groups, hits, radiance);
                     if (bounce == 0) reflected(hits, radiance);
                 },
-                [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); },
-                {std::max(1, options.bake_samples / 4), options.seed + static_cast<std::uint32_t>(bounce)}, progress);
-            stats.bake_rays += brought.rays;
-            stats.dropped_samples += brought.dropped_samples;
-            keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), brought.values);
-            for (std::size_t k = 0; k < brought.values.size(); ++k) lit[i].irradiance[k] += brought.values[k];
-            last[i] = brought.values;
+                [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
+                progress);
+            stats.bake_rays += last[i].rays;
+            stats.dropped_samples += last[i].dropped_samples;
+            keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), last[i]);
+            for (std::size_t k = 0; k < last[i].values.size(); ++k) lit[i].irradiance[k] += last[i].values[k];
+            for (std::size_t k = 0; k < last[i].moments.size(); ++k) lit[i].moments[k] += last[i].moments[k];
         }
     }
 }

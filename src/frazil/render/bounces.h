@@ -11,8 +11,8 @@
 
 namespace frazil {
 
-// Scale the (N, groups) irradiance of points by the part that their overlays let enter (SurfaceResolver::entering).
-void keep_entering(const std::vector<float>& entering, std::vector<Rgb>& irradiance);
+// Scale the light of points by the part that their overlays let enter (SurfaceResolver::entering).
+void keep_entering(const std::vector<float>& entering, Irradiance& irradiance);
 
 // Add options.bake_bounces bounces to the irradiance of every body's points; `lit` runs along with `bodies`.
 void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,

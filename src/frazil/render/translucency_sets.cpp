@@ -103,6 +103,24 @@ std::vector<Rgb> TranslucencySets::united(std::size_t leader, std::size_t column
     return result;
 }
 
+std::shared_ptr<const Cells> TranslucencySets::cells(std::size_t leader, const CellsOfObject& cells) const {
+    const Union* set = find(leader);
+    if (!set) return cells(leader);
+    std::map<std::size_t, std::shared_ptr<const Cells>> known;
+    for (const std::size_t object : set->members) {
+        known[object] = cells(object);
+        if (!known[object]) return nullptr;
+    }
+    auto result = std::make_shared<Cells>();
+    for (const auto& [object, point] : set->sources) {
+        const Cells& own = *known[object];
+        result->areas.push_back(own.areas[point]);
+        result->centroids.push_back(own.centroids[point]);
+        result->covariances.push_back(own.covariances[point]);
+    }
+    return result;
+}
+
 const Shells* TranslucencySets::shells(std::size_t leader) const {
     const Union* set = find(leader);
     return set ? &set->shells : nullptr;

@@ -34,6 +34,9 @@ class TranslucencySets {
     // Their values, (N, columns), from those of each member's own points.
     using OfObject = std::function<const std::vector<Rgb>&(std::size_t object)>;
     std::vector<Rgb> united(std::size_t leader, std::size_t columns, const OfObject& values) const;
+    // The cells of points(leader), from those of each member's own points; null where a member has none.
+    using CellsOfObject = std::function<std::shared_ptr<const Cells>(std::size_t object)>;
+    std::shared_ptr<const Cells> cells(std::size_t leader, const CellsOfObject& cells) const;
     // Null for a body by itself.
     const Shells* shells(std::size_t leader) const;
 

@@ -58,46 +58,57 @@ struct Cut {
         add_powers(&tree.node_powers[index * 3 * tree.groups], 1.0f);
     }
 
-    // A disc of surface of area A * share about a point.
-    void add_disc(std::uint32_t p, const V3f& center, float share, float largest_squared) {
-        const float area = tree.areas[p] * share;
-        const V3f& n = tree.normals[p];
-        // The second moments of a disc; of one that stays too large for them, those of the largest that they hold for.
-        const float v = has_footprints ? std::min(0.25f * area * kInvPi, 0.25f * largest_squared) : 0.0f;
+    // A part of a point's cell about `center`: `share` of its area, `weight` times the mean power there.
+    void add_part(std::uint32_t p, const PointCell& cell, const V3f& center, float share, float weight,
+                  const V3f& power_offset, float largest_squared) {
+        const float area = tree.areas[p] * share, squared = 2.0f * cell.trace * share;
+        // Of a part that stays too large for its second moments, those of the largest that they hold for.
+        float v = has_footprints ? share : 0.0f;
+        if (squared > largest_squared && has_footprints) v *= largest_squared / squared;
+        const auto& c = cell.covariance;
         list.sources.push_back({{center.x, center.y, center.z},
-                                {v * (1.0f - n.x * n.x), v * (1.0f - n.y * n.y), v * (1.0f - n.z * n.z),
-                                 -2.0f * v * n.x * n.y, -2.0f * v * n.x * n.z, -2.0f * v * n.y * n.z},
-                                2.0f * v,
-                                {0.0f, 0.0f, 0.0f},
+                                {v * c[0], v * c[1], v * c[2], 2.0f * v * c[3], 2.0f * v * c[4], 2.0f * v * c[5]},
+                                v * cell.trace,
+                                {2.0f * power_offset.x, 2.0f * power_offset.y, 2.0f * power_offset.z},
                                 area,
                                 {0.0f, 0.0f, 0.0f}});
-        add_powers(&tree.irradiance[p * tree.groups].x, area);
+        add_powers(&tree.irradiance[p * tree.groups].x, area * weight);
     }
 
-    // A disc that is large against the kernel is cut into seven of equal area with the same second moments together.
-    void add_split_disc(std::uint32_t p, const V3f& center, float share, float largest_squared) {
-        const float squared = tree.areas[p] * share * kInvPi;  // of the radius; the trace is half of it
-        if (squared <= largest_squared || share < 1e-3f) return add_disc(p, center, share, largest_squared);
-        const auto [tangent, bitangent] = tangent_frame(tree.normals[p]);
-        add_split_disc(p, center, share / 7.0f, largest_squared);
+    // A cell that is large against the kernel is cut into seven parts of equal area with the same second moments together.
+    void add_split(std::uint32_t p, const PointCell& cell, const CellFrame& frame, const V2f& z, float share,
+                   float largest_squared) {
+        if (2.0f * cell.trace * share <= largest_squared || share < 1e-3f) {
+            const float weight = frame.power_at(z);
+            // The centre of power within the part.
+            const float within = weight > 0.25f ? share / weight : 0.0f;
+            return add_part(p, cell, tree.positions[p] + frame.axes[0] * z.x + frame.axes[1] * z.y, share, weight,
+                            (frame.axes[0] * frame.lean.x + frame.axes[1] * frame.lean.y) * within, largest_squared);
+        }
+        add_split(p, cell, frame, z, share / 7.0f, largest_squared);
+        const float reach = std::sqrt(2.0f * share);
         for (int k = 0; k < 6; ++k) {
-            const float angle = k * kPi / 3.0f, reach = std::sqrt(0.5f * squared);
-            add_split_disc(p, center + tangent * (reach * std::cos(angle)) + bitangent * (reach * std::sin(angle)),
-                           share / 7.0f, largest_squared);
+            const float angle = k * kPi / 3.0f;
+            add_split(p, cell, frame, z + V2f(std::cos(angle), std::sin(angle)) * reach, share / 7.0f, largest_squared);
         }
     }
 
     void add_points(const TreeNode& leaf, const Box3f& box) {
         for (std::uint32_t p = leaf.first; p < leaf.first + leaf.size(); ++p) {
-            if (has_footprints) {
-                // From the disc's rim: what stands on a disc is nearest to its middle pieces.
-                const float radius = std::sqrt(tree.areas[p] * kInvPi);
-                const float distance = std::max(0.0f, std::sqrt(squared_distance(box, tree.positions[p])) - radius);
-                const float q = distance * distance;
-                add_split_disc(p, tree.positions[p], 1.0f, kDiscShare * rule->largest_squared(q));
-            } else {
-                add_disc(p, tree.positions[p], 1.0f, 0.0f);
+            const PointCell cell(tree, p);
+            if (!has_footprints) {
+                add_part(p, cell, tree.positions[p], 1.0f, 1.0f, V3f(0.0f), 0.0f);
+                continue;
             }
+            // From the cell's rim: what stands on a cell is nearest to its middle parts.
+            const float squared = 2.0f * cell.trace;
+            const float distance =
+                std::max(0.0f, std::sqrt(squared_distance(box, tree.positions[p])) - std::sqrt(squared));
+            const float largest = kDiscShare * rule->largest_squared(distance * distance);
+            if (squared <= largest)
+                add_part(p, cell, tree.positions[p], 1.0f, 1.0f, cell.power_offset, largest);
+            else
+                add_split(p, cell, CellFrame(tree, p, cell), V2f(0.0f), 1.0f, largest);
         }
     }
 

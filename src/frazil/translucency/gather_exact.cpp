@@ -6,22 +6,31 @@
 namespace frazil {
 namespace {
 
-// The mean of a kernel over a disc by Gauss nodes in radius² and equal angles; the plain value where it is small.
+// The mean of a kernel over a point's cell, an elliptic disc that is a little thick, by Gauss nodes in radius² and equal
+// angles; the value at its centroid where it is small. `kernel(distance, weight of area, weight of power)`.
 template <class Kernel>
-void average_over_disc(const V3d& offset, const V3f& normal, double radius, bool is_small, const Kernel& kernel) {
-    if (is_small) return kernel(std::sqrt(offset.length2()), 1.0);
+void average_over_cell(const V3d& offset, const CellFrame& frame, bool is_small, const Kernel& kernel) {
+    if (is_small) return kernel(std::sqrt(offset.length2()), 1.0, 1.0);
     constexpr int kAngles = 24;
     constexpr double kNode[8] = {0.019855071751232, 0.101666761293187, 0.237233795041836, 0.408282678752175,
                                  0.591717321247825, 0.762766204958164, 0.898333238706813, 0.980144928248768};
     constexpr double kWeight[8] = {0.050614268145188, 0.111190517226687, 0.156853322938944, 0.181341891689181,
                                    0.181341891689181, 0.156853322938944, 0.111190517226687, 0.050614268145188};
-    const auto [tangent, bitangent] = tangent_frame(normal);
+    const V3d s(frame.axes[0]), t(frame.axes[1]), n(frame.axes[2]);
+    const bool is_flat = n.length2() < 1e-8 * (s.length2() + t.length2());
     for (int i = 0; i < 8; ++i) {
-        const double rho = radius * std::sqrt(kNode[i]);
+        const double rho = 2.0 * std::sqrt(kNode[i]);
         for (int j = 0; j < kAngles; ++j) {
             const double angle = 2.0 * 3.14159265358979323846 * (j + 0.5 * (i % 2)) / kAngles;
-            const V3d d = offset + V3d(tangent) * (rho * std::cos(angle)) + V3d(bitangent) * (rho * std::sin(angle));
-            kernel(std::sqrt(d.length2()), kWeight[i] / kAngles);
+            const double x = rho * std::cos(angle), y = rho * std::sin(angle), weight = kWeight[i] / kAngles;
+            const double power = weight * frame.power_at({static_cast<float>(x), static_cast<float>(y)});
+            const V3d d = offset + s * x + t * y;
+            if (is_flat) {
+                kernel(std::sqrt(d.length2()), weight, power);
+            } else {
+                kernel(std::sqrt((d + n).length2()), 0.5 * weight, 0.5 * power);
+                kernel(std::sqrt((d - n).length2()), 0.5 * weight, 0.5 * power);
+            }
         }
     }
 }
@@ -42,13 +51,16 @@ Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estima
             V3d coverage(0.0);
             for (std::size_t p = 0; p < tree.positions.size(); ++p) {
                 const V3d offset = V3d(tree.positions[p]) - V3d(positions[i]);
-                const double radius = footprint_radius(tree.areas[p]), r = offset.length();
+                const PointCell cell(tree, static_cast<std::uint32_t>(p));
+                const double radius = std::sqrt(2.0 * cell.trace), r = offset.length();
                 const bool is_small = estimator == Estimator::sum || radius < 1e-4 * std::hypot(r, shortest);
-                average_over_disc(offset, tree.normals[p], radius, is_small, [&](double distance, double weight) {
+                const CellFrame frame(tree, static_cast<std::uint32_t>(p), cell);
+                average_over_cell(offset, frame, is_small, [&](double distance, double weight, double power) {
                     const Rgb color = eval(tree.ramp, static_cast<float>(distance));
                     for (int c = 0; c < 3; ++c) {
-                        const double share = reflectance(tree.profile, c, distance) * tree.areas[p] * weight;
-                        coverage[c] += share;
+                        const double density = reflectance(tree.profile, c, distance) * tree.areas[p];
+                        coverage[c] += density * weight;
+                        const double share = density * power;
                         for (std::size_t g = 0; g < tree.groups; ++g) {
                             sums[3 * g + c] +=
                                 share * tree.irradiance[p * tree.groups + g][c] * color[c] * tree.ramp_scale[c];

@@ -13,6 +13,53 @@ namespace {
 
 constexpr std::uint32_t kLeafPoints = 8;
 
+// Octahedral map of a unit vector, 2e-5 rad fine.
+std::array<std::int16_t, 2> packed_normal(const V3f& n) {
+    const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    if (!(sum > 0.0f)) return {0, 0};
+    float x = n.x / sum, y = n.y / sum;
+    if (n.z < 0.0f) {
+        const float folded = (1.0f - std::abs(y)) * (x < 0.0f ? -1.0f : 1.0f);
+        y = (1.0f - std::abs(x)) * (y < 0.0f ? -1.0f : 1.0f);
+        x = folded;
+    }
+    return {static_cast<std::int16_t>(std::lround(x * 32767.0f)), static_cast<std::int16_t>(std::lround(y * 32767.0f))};
+}
+
+V3f unpacked_normal(const std::array<std::int16_t, 2>& packed) {
+    V3f n(packed[0] / 32767.0f, packed[1] / 32767.0f, 0.0f);
+    n.z = 1.0f - std::abs(n.x) - std::abs(n.y);
+    if (n.z < 0.0f) {
+        const float x = (1.0f - std::abs(n.y)) * (n.x < 0.0f ? -1.0f : 1.0f);
+        n.y = (1.0f - std::abs(n.x)) * (n.y < 0.0f ? -1.0f : 1.0f);
+        n.x = x;
+    }
+    return n.normalized();
+}
+
+// From a cell's centroid to its centre of power, all groups together, in magnitude.
+V3f power_offset(const Rgb* irradiance, const V3f* moments, std::size_t groups) {
+    V3f moment(0.0f);
+    float power = 0.0f;
+    for (std::size_t g = 0; g < groups; ++g) {
+        const float sum = irradiance[g].x + irradiance[g].y + irradiance[g].z;
+        power += std::abs(sum);
+        moment += sum < 0.0f ? -moments[g] : moments[g];
+    }
+    return power > 0.0f ? moment / power : V3f(0.0f);
+}
+
+void check_cells(const PointSet& points, const Cells& cells, const std::vector<V3f>& moments, std::size_t values) {
+    if (cells.size() != points.size()) {
+        throw ValueError(str("PointTree: cells must be one per point (", points.size(), "), got ", cells.size(),
+                             ". Make them from these points."));
+    }
+    if (!moments.empty() && moments.size() != values) {
+        throw ValueError(
+            str("PointTree: moments must be one per irradiance (", values, "), got ", moments.size(), "."));
+    }
+}
+
 void check_points(const PointSet& points, std::size_t irradiance_count, std::size_t groups) {
     const std::size_t n = points.size();
     if (n == 0) throw ValueError("PointTree: points must not be empty, got 0 points. Choose a smaller spacing.");
@@ -149,6 +196,7 @@ void sum_leaf(PointTree::Impl& tree, std::uint32_t n) {
     for (std::uint32_t p = node.first; p < node.first + node.size(); ++p) {
         const V3d d = V3d(tree.positions[p]) - about;
         const float area = tree.areas[p];
+        const PointCell cell(tree, p);
         const float* e = &tree.irradiance[p * tree.groups].x;
         float power = 0.0f;
         for (std::size_t c = 0; c < row; ++c) {
@@ -156,8 +204,8 @@ void sum_leaf(PointTree::Impl& tree, std::uint32_t n) {
             power += std::abs(e[c] * area);
         }
         sums.add_area(area, d);
-        sums.footprint += double(area) * area / (4.0 * kPi);  // a disc's variance is a²/4 along each axis
-        sums.add_power(power, d);
+        sums.footprint += double(area) * 0.5 * cell.trace;
+        sums.add_power(power, d + V3d(cell.power_offset));
     }
     finish(sums, about, node, tree.moments[n]);
     float squared = 0.0f;
@@ -238,9 +286,10 @@ std::vector<KeyedIndex> sorted_points(const PointSet& points, const std::vector<
 }  // namespace
 
 PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
-                     const Ramp& ramp)
+                     const Ramp& ramp, const Cells* cells, const std::vector<V3f>& moments)
     : impl_(new Impl{profile}) {
     check_points(points, irradiance.size(), groups);
+    if (cells) check_cells(points, *cells, moments, irradiance.size());
     check_ramp(ramp, "Ramp");
     Impl& tree = *impl_;
     tree.ramp = ramp;
@@ -255,15 +304,24 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
     if (keys.empty()) return;
     const std::size_t n = keys.size();
     tree.positions.resize(n);
-    tree.normals.resize(n);
+    tree.footprints.resize(n);
     tree.areas.resize(n);
+    if (!moments.empty()) tree.leans.resize(n);
     tree.irradiance.resize(n * groups);
     parallel_for(n, 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const std::uint32_t k = keys[i].index;
-            tree.positions[i] = points.positions[k];
-            tree.normals[i] = points.normals[k];
-            tree.areas[i] = points.areas[k];
+            const float area = cells ? cells->areas[k] : points.areas[k], inverse = area > 0.0f ? 1.0f / area : 0.0f;
+            tree.positions[i] = cells ? cells->centroids[k] : points.positions[k];
+            tree.areas[i] = area;
+            const Covariance covariance =
+                cells ? cells->covariances[k] : disc_covariance(points.areas[k], points.normals[k]);
+            for (int j = 0; j < 6; ++j) tree.footprints[i].covariance[j] = covariance[j] * inverse;
+            tree.footprints[i].normal = packed_normal(points.normals[k]);
+            if (!tree.leans.empty()) {
+                const V3f offset = power_offset(&irradiance[k * groups], &moments[k * groups], groups);
+                for (int j = 0; j < 3; ++j) tree.leans[i][j] = offset[j] * std::sqrt(inverse);
+            }
             for (std::size_t g = 0; g < groups; ++g) tree.irradiance[i * groups + g] = irradiance[k * groups + g];
         }
     });
@@ -281,6 +339,47 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
                 tree.nodes[k].is_leaf() ? sum_leaf(tree, k) : sum_children(tree, k);
             }
         });
+    }
+}
+
+PointCell::PointCell(const PointTree::Impl& tree, std::uint32_t point) : power_offset(0.0f) {
+    const float area = tree.areas[point];
+    for (int j = 0; j < 6; ++j) covariance[j] = float(tree.footprints[point].covariance[j]) * area;
+    trace = covariance[0] + covariance[1] + covariance[2];
+    if (tree.leans.empty()) return;
+    const float root = std::sqrt(area);
+    for (int j = 0; j < 3; ++j) power_offset[j] = float(tree.leans[point][j]) * root;
+}
+
+CellFrame::CellFrame(const PointTree::Impl& tree, std::uint32_t point, const PointCell& cell) {
+    const V3f normal = unpacked_normal(tree.footprints[point].normal);
+    const auto [tangent, bitangent] = tangent_frame(normal);
+    const std::array<V3f, 3> frame = {tangent, bitangent, normal};
+    const auto& c = cell.covariance;
+    const auto through = [&](const V3f& a) {
+        return V3f(c[0] * a.x + c[3] * a.y + c[4] * a.z, c[3] * a.x + c[1] * a.y + c[5] * a.z,
+                   c[4] * a.x + c[5] * a.y + c[2] * a.z);
+    };
+    // Cholesky's factor in that frame; what rounding leaves below zero is zero.
+    float l[3][3] = {};
+    for (int i = 0; i < 3; ++i) {
+        const V3f row = through(frame[i]);
+        for (int j = 0; j <= i; ++j) {
+            float sum = row.dot(frame[j]);
+            for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
+            if (i == j)
+                l[i][i] = std::sqrt(std::max(0.0f, sum));
+            else
+                l[i][j] = l[j][j] > 1e-4f * std::sqrt(cell.trace) ? sum / l[j][j] : 0.0f;
+        }
+    }
+    for (int j = 0; j < 3; ++j) axes[j] = frame[0] * l[0][j] + frame[1] * l[1][j] + frame[2] * l[2][j];
+    // Forward substitution for the lean; flat cells have none along their normal.
+    lean = V3f(0.0f);
+    for (int i = 0; i < 3; ++i) {
+        float sum = cell.power_offset.dot(frame[i]);
+        for (int k = 0; k < i; ++k) sum -= l[i][k] * lean[k];
+        lean[i] = i < 2 && l[i][i] > 1e-4f * std::sqrt(cell.trace) ? sum / l[i][i] : 0.0f;
     }
 }
 

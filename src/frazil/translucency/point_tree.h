@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/points/cells.h"
 #include "frazil/points/point_set.h"
 #include "frazil/translucency/profile.h"
 #include "frazil/translucency/ramp.h"
@@ -18,7 +19,7 @@
 namespace frazil {
 
 enum class Estimator {
-    noise_free,  // kernel averaged over the footprints of near points, normalised by the coverage's sampling error
+    noise_free,  // kernel averaged over the cell of each point, or over a disc of its area where cells are unknown
     sum,         // the plain sum of [JensenBuhler2002]
 };
 
@@ -42,9 +43,11 @@ class PointTree {
   public:
     struct Impl;
 
-    // `irradiance` is (N, groups), row by row: irradiance[k * groups + g]. ValueError where sizes disagree.
+    // `irradiance` is (N, groups), row by row: irradiance[k * groups + g]. With `cells` it is a mean over each cell, and
+    // `moments`, (N, groups) or empty, its covariance with the place in the cell, all channels together (Irradiance).
+    // ValueError where sizes disagree.
     PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
-              const Ramp& ramp = {});
+              const Ramp& ramp = {}, const Cells* cells = nullptr, const std::vector<V3f>& moments = {});
     ~PointTree();
     PointTree(PointTree&&) noexcept;
     PointTree& operator=(PointTree&&) noexcept;

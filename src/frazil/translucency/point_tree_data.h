@@ -6,11 +6,14 @@
 // Not: part of the public interface.
 #pragma once
 
+#include <Imath/half.h>
+
 #include <array>
 #include <cstdint>
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/points/cells.h"
 #include "frazil/translucency/kernel_table.h"
 #include "frazil/translucency/point_tree.h"
 
@@ -37,6 +40,14 @@ struct NodeMoments {
     std::array<float, 3> power_offset{};  // twice the way from center to the centre of power over all groups
 };
 
+// The second moments of a point's cell over its area, in half precision, and its normal as an octahedron's map.
+struct Footprint {
+    std::array<Imath::half, 6> covariance;
+    std::array<std::int16_t, 2> normal;
+};
+// From a cell's centroid to its centre of power, over the root of its area.
+using PowerLean = std::array<Imath::half, 3>;
+
 struct PointTree::Impl {
     explicit Impl(const Profile& made_of) : profile(made_of) {}
 
@@ -51,15 +62,32 @@ struct PointTree::Impl {
     std::vector<TreeNode> nodes;       // root first, level by level
     std::vector<NodeMoments> moments;  // of each node
     std::vector<float> node_powers;    // (nodes, 3 groups): Σ E A
-    // Points in Morton order.
-    std::vector<V3f> positions, normals;
+    // Points in Morton order; positions are the centroids of cells where these are known.
+    std::vector<V3f> positions;
     std::vector<float> areas;
-    std::vector<Rgb> irradiance;  // (points, groups)
+    std::vector<Footprint> footprints;
+    std::vector<PowerLean> leans;  // empty where light is known at points alone
+    std::vector<Rgb> irradiance;   // (points, groups)
 };
 
-// The disc-shaped footprint of a point: its radius, given its area.
-inline float footprint_radius(float area) {
-    return std::sqrt(area * kInvPi);
-}
+// What a source needs to know of the surface that a point stands for: an elliptic disc in the plane of its normal, of these
+// second moments, a little thick where the surface is curved.
+struct PointCell {
+    Covariance covariance;
+    float trace;
+    V3f power_offset;  // from the position to the centre of power
+
+    PointCell(const PointTree::Impl& tree, std::uint32_t point);
+};
+
+// The linear map from the unit frame to the cell: columns along two tangents and the normal; and how the cell's power
+// changes along these, 1 + lean . z. A uniform disc of radius 2 in z's plane has the cell's moments.
+struct CellFrame {
+    std::array<V3f, 3> axes;
+    V3f lean;
+
+    CellFrame(const PointTree::Impl& tree, std::uint32_t point, const PointCell& cell);
+    float power_at(const V2f& z) const { return std::max(0.0f, 1.0f + lean.x * z.x + lean.y * z.y); }
+};
 
 }  // namespace frazil

@@ -1,0 +1,135 @@
+"""Path-traced references of more shapes and media for bench/truth.py, with Mitsuba 3 (`pip install mitsuba`).
+
+    python bench/references.py FOLDER [--only torus slab ...] [--size 40] [--samples 256]
+
+Writes NAME.npz and NAME.ply per scene: index-matched, isotropic scattering, volpath; `stderr` is half the difference of
+two renders. Prints the processor seconds that each took. Then: python bench/truth.py FOLDER/NAME.npz FOLDER/NAME.ply
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+
+def blob() -> trimesh.Trimesh:
+    shape = trimesh.creation.icosphere(subdivisions=5, radius=0.42)
+    v = shape.vertices
+    shape.vertices = v * (1 + 0.2 * np.sin(11 * v[:, :1]) * np.cos(9 * v[:, 1:2] + 1))
+    return shape
+
+
+def slab() -> trimesh.Trimesh:
+    shape = trimesh.creation.box((1.0, 0.08, 1.0))
+    return shape.apply_transform(trimesh.transformations.rotation_matrix(0.9, (1, 0.3, 0)))
+
+
+def torus() -> trimesh.Trimesh:
+    shape = trimesh.creation.torus(0.36, 0.13, major_sections=96, minor_sections=48)
+    return shape.apply_transform(trimesh.transformations.rotation_matrix(-0.8, (1, 0.2, 0)))
+
+
+# Shape, sigma_s_prime and sigma_a in 1/m. Albedo from 0.7 to 0.9999, bodies from 4 to 50 mean free paths across.
+SCENES = {
+    "torus": (torus, (20.0, 20.0, 20.0), (0.4, 0.1, 0.03)),
+    "slab": (slab, (25.0, 25.0, 25.0), (0.5, 0.1, 0.02)),
+    "blob": (blob, (30.0, 30.0, 30.0), (1.0, 0.3, 0.003)),
+    "blob_dark": (blob, (21.0, 24.0, 27.0), (9.0, 6.0, 3.0)),
+    "torus_clear": (torus, (5.0, 5.0, 5.0), (0.2, 0.05, 0.01)),
+    "blob_dense": (blob, (80.0, 80.0, 80.0), (0.8, 0.2, 0.04)),
+}
+ENV, LIGHT = 0.4, [[1.4, 1.8, 1.2], [0.0, 0.0, 0.0], 0.45, 12.0]
+CAMERA, FOV = [[0.3, 0.5, 2.4], [0.0, 0.0, 0.0]], 30.0
+
+
+def render(mi, ply: Path, scatter, absorb, size: int, samples: int, seed: int) -> np.ndarray:
+    look = mi.ScalarTransform4f().look_at
+    sigma_t = np.add(scatter, absorb)
+    centre, target, half, radiance = LIGHT
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "max_depth": 4000, "rr_depth": 2000},
+            "sensor": {
+                "type": "perspective", "fov": FOV, "to_world": look(*CAMERA, [0, 1, 0]),
+                "film": {"type": "hdrfilm", "width": size, "height": size, "pixel_format": "rgb",
+                         "rfilter": {"type": "box"}},
+                "sampler": {"type": "independent", "sample_count": samples},
+            },
+            "ice": {
+                "type": "ply", "filename": str(ply), "face_normals": True, "bsdf": {"type": "null"},
+                "interior": {
+                    "type": "homogeneous", "scale": float(sigma_t.max()),
+                    "sigma_t": {"type": "rgb", "value": (sigma_t / sigma_t.max()).tolist()},
+                    "albedo": {"type": "rgb", "value": (np.array(scatter) / sigma_t).tolist()},
+                },
+            },
+            "env": {"type": "constant", "radiance": {"type": "rgb", "value": [ENV] * 3}},
+            "light": {
+                "type": "rectangle",
+                "to_world": look(centre, target, [0, 1, 0]) @ mi.ScalarTransform4f().scale([half, half, 1]),
+                "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [radiance] * 3}},
+            },
+        }
+    )  # fmt: skip
+    return np.array(mi.render(scene, seed=seed))
+
+
+def coverage(shape: trimesh.Trimesh, size: int) -> np.ndarray:
+    """1 where all of a pixel sees the body: by Frazil's own alpha."""
+    import sys
+
+    import frazil as fz
+
+    sys.path.insert(0, str(Path(__file__).parent))
+    from truth import look_at
+
+    scene = fz.Scene()
+    mesh = scene.add_mesh(fz.Mesh(shape.vertices, shape.faces), "/body")
+    scene.add_object("/body", mesh, scene.add_material("/grey", fz.StandardMaterial()))
+    scene.add_light(fz.Light(fz.DomeLight(), path="/sky"))
+    aperture = 100.0 * np.tan(np.radians(FOV) / 2)
+    scene.camera = fz.Camera(
+        matrix=look_at(*CAMERA), focal_length=50.0, horizontal_aperture=aperture, vertical_aperture=aperture
+    )
+    film = fz.render(scene, resolution=(size, size), samples=64, pixel_filter="box", aovs=["beauty"])
+    return film["beauty"][..., 3]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="+", choices=SCENES, default=list(SCENES))
+    parser.add_argument("--size", type=int, default=40)
+    parser.add_argument("--samples", type=int, default=256)
+    options = parser.parse_args()
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    options.folder.mkdir(parents=True, exist_ok=True)
+    for name in options.only:
+        make, scatter, absorb = SCENES[name]
+        shape, ply = make(), options.folder / f"{name}.ply"
+        shape.export(ply)
+        start = time.process_time()
+        halves = [render(mi, ply, scatter, absorb, options.size, options.samples // 2, seed) for seed in (1, 2)]
+        seconds = time.process_time() - start
+        params = {
+            "mesh": ply.name, "sigma_s_prime": scatter, "sigma_a": absorb, "env": [ENV] * 3, "light": LIGHT,
+            "camera": CAMERA, "fov": FOV,
+        }  # fmt: skip
+        np.savez(
+            options.folder / f"{name}.npz",
+            radiance=0.5 * (halves[0] + halves[1]),
+            stderr=0.5 * np.abs(halves[0] - halves[1]),
+            coverage=coverage(shape, options.size),
+            params=json.dumps(params),
+        )
+        print(f"{name}: {seconds:.1f} s of processor time", flush=True)
+
+
+if __name__ == "__main__":
+    main()

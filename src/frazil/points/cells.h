@@ -1,0 +1,61 @@
+// The surface that each point stands for, its cell: by its moments, and by places spread over it.
+// Model: the mesh is cut into pieces smaller than a cell, each of which belongs to the nearest point on its side; moments
+//   are the exact sums over these pieces. So cells need not be the nearest surface to the last piece: whatever they are,
+//   together they are the mesh, and nothing is lost or counted twice.
+// Units: metres, m².
+// Valid: points that cover the mesh within their spacing, as poisson_points makes them; the same bits for any number of
+//   threads.
+// Not: kept with the points: cells belong to one pose of the mesh, and are made anew in about the time of a few rays each.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "frazil/base/vec.h"
+#include "frazil/geometry/mesh.h"
+#include "frazil/points/point_set.h"
+
+namespace frazil {
+
+// Second central moments: xx, yy, zz, xy, xz, yz.
+using Covariance = std::array<float, 6>;
+
+// The covariance of a flat disc of that area, as seen from its rim's plane: what a point stands for where cells are unknown.
+Covariance disc_covariance(float area, const V3f& normal);
+
+// A place on the mesh, and the area of its cell that it stands for.
+struct CellPlace {
+    std::uint32_t triangle = 0;
+    V2f barycentrics = V2f(0.0f);  // of the triangle's second and third corner
+    float area = 0.0f;
+};
+
+struct Cells {
+    std::vector<float> areas;
+    std::vector<V3f> centroids;
+    std::vector<Covariance> covariances;
+    // Places of point k are places[first[k]] to places[first[k + 1]]; none where no surface is nearest to it.
+    std::vector<std::uint32_t> first;
+    std::vector<CellPlace> places;
+
+    std::size_t size() const { return areas.size(); }
+};
+
+// `most_places` of each cell are kept, at most; more numerous pieces are sampled without bias [Duffield2007].
+// ValueError where points and mesh do not belong together.
+Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places = 64, std::uint32_t seed = 0);
+
+// A place's position and geometric normal.
+V3f position_of(const CellPlace& place, const Mesh& mesh);
+V3f normal_of(const CellPlace& place, const Mesh& mesh);
+
+// Values at places, (places, groups) row by row, as a mean over each cell and, summed over channels, its covariance with the
+// place. ValueError where there are not as many rows as places.
+struct CellMeans {
+    std::vector<Rgb> means;    // (N, groups)
+    std::vector<V3f> moments;  // (N, groups), in metres times the values' unit
+};
+CellMeans cell_means(const Cells& cells, const Mesh& mesh, const std::vector<Rgb>& values, std::size_t groups);
+
+}  // namespace frazil

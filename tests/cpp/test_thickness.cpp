@@ -1,0 +1,92 @@
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "frazil/render/thickness.h"
+#include "frazil/translucency/half_space.h"
+#include "shapes.h"
+
+namespace frazil {
+namespace {
+
+// A flat box about the origin, so wide that its sides do not matter in the middle.
+Mesh slab(float thickness, bool has_bottom = true) {
+    Mesh mesh;
+    const float half = 1000.0f * thickness;
+    for (const float y : {0.0f, -thickness}) {
+        for (const V2f& c : {V2f(-half, half), V2f(half, half), V2f(half, -half), V2f(-half, -half)}) {
+            mesh.positions.push_back({c.x, y, c.y});
+        }
+    }
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    if (has_bottom) mesh.triangles.insert(mesh.triangles.end(), {{4, 6, 5}, {4, 7, 6}});
+    return mesh;
+}
+
+PointSet middle() {
+    PointSet points;
+    for (int k = 0; k < 64; ++k) {
+        points.positions.push_back({0.01f * k, 0.0f, 0.0f});
+        points.normals.push_back({0.0f, 1.0f, 0.0f});
+        points.areas.push_back(1.0f);
+    }
+    return points;
+}
+
+Rgb mean_gain(const Mesh& mesh, const Medium& medium, const Rgb& traced_once = Rgb(0.0f)) {
+    const RayScene scene({mesh}, {Placement{}});
+    Rgb sum(0.0f);
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium, traced_once)) sum += gain / 64.0f;
+    return sum;
+}
+
+}  // namespace
+
+TEST_CASE("thickness: a thin slab absorbs sigma_a times its mean chord, twice its thickness") {
+    // Absorption at one hundredth, a tenth and all of the chord's worth.
+    const float thickness = 0.1f;
+    const Medium medium{Rgb(5.0f), Rgb(0.02f, 0.005f, 0.0f), 1.0f};
+    const Rgb gain = mean_gain(slab(thickness), medium);
+    for (int c = 0; c < 3; ++c) {
+        const double alpha = 5.0 / (5.0 + medium.sigma_a[c]), plane = half_space_albedo(alpha, 1.0).all();
+        const double absorbed = 1.0 - gain[c] * plane;
+        // 16 chords of a heavy-tailed length: the mean of 64 points is within some percent.
+        CHECK(absorbed == doctest::Approx(medium.sigma_a[c] * 2.0 * thickness).epsilon(0.2));
+    }
+    CHECK(gain.z == doctest::Approx(1.0f).epsilon(1e-4));
+}
+
+TEST_CASE("thickness: what is thick against its absorption, or has no other side, returns what a plane does") {
+    const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.31f};
+    for (const Mesh& mesh : {slab(30.0f), slab(0.01f, false)}) {
+        const Rgb gain = mean_gain(mesh, medium);
+        for (int c = 0; c < 3; ++c) CHECK(gain[c] == doctest::Approx(1.0f).epsilon(1e-4));
+    }
+}
+
+TEST_CASE("thickness: gains grow as the slab gets thinner and never bring more than all light back") {
+    const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.31f};
+    Rgb last(1.0f);
+    for (const float thickness : {1.0f, 0.1f, 0.01f, 0.001f}) {
+        const Rgb gain = mean_gain(slab(thickness), medium);
+        for (int c = 0; c < 3; ++c) {
+            const double alpha = 50.0 / (50.0 + medium.sigma_a[c]);
+            CHECK(gain[c] >= last[c] * 0.999f);
+            CHECK(gain[c] * half_space_albedo(alpha, medium.eta).all() <= 1.0001);
+        }
+        last = gain;
+    }
+    CHECK(last.z > 1.5f);
+}
+
+TEST_CASE("thickness: light of one scattering that rays trace is in neither side of the ratio") {
+    const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.0f};
+    const Mesh mesh = slab(0.02f);
+    const Rgb all = mean_gain(mesh, medium), once(0.1f), less = mean_gain(mesh, medium, once);
+    for (int c = 0; c < 3; ++c) {
+        const float plane = static_cast<float>(half_space_albedo(50.0 / (50.0 + medium.sigma_a[c]), 1.0).all());
+        CHECK(less[c] * (plane - once[c]) == doctest::Approx(all[c] * plane - once[c]).epsilon(1e-4));
+    }
+}
+
+}  // namespace frazil
