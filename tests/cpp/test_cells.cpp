@@ -1,10 +1,12 @@
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <cstring>
 
 #include "frazil/base/parallel.h"
 #include "frazil/points/cells.h"
 #include "frazil/points/poisson.h"
+#include "frazil/translucency/point_tree.h"
 #include "shapes.h"
 
 namespace frazil {
@@ -22,6 +24,27 @@ TEST_CASE("cells: the same bits for one thread and for four, and the mesh's area
     double area = 0.0;
     for (const float a : one.areas) area += a;
     CHECK(area == doctest::Approx(surface_area(mesh)).epsilon(1e-6));
+}
+
+TEST_CASE("cells: a sliver, long and with no area to speak of, is gathered as what it is: nearly nothing") {
+    PointSet points;
+    points.positions = {V3f(0.0f)};
+    points.normals = {V3f(0.0f, 1.0f, 0.0f)};
+    points.areas = {1e-12f};
+    points.spacing = 0.05;
+    Cells cells;
+    cells.areas = points.areas;
+    cells.centroids = points.positions;
+    cells.covariances = {{1e-3f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f}};
+    Medium medium;
+    medium.sigma_s_prime = Rgb(30.0f);
+    medium.sigma_a = Rgb(0.1f);
+    medium.eta = 1.31f;
+    const PointTree tree(points, {Rgb(1.0f)}, 1, Profile(Dipole(medium)), {}, &cells, {V3f(1e-2f, 0.0f, 0.0f)});
+    const auto out = tree.gather(points.positions.data(), 1, GatherOptions());
+    CHECK(std::isfinite(out.exitance[0].x));
+    CHECK(std::isfinite(out.coverage[0].x));
+    CHECK(std::abs(out.coverage[0].x) < 1e-6f);
 }
 
 }  // namespace frazil

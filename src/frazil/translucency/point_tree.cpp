@@ -49,6 +49,13 @@ V3f power_offset(const Rgb* irradiance, const V3f* moments, std::size_t groups) 
     return power > 0.0f ? moment / power : V3f(0.0f);
 }
 
+// By what a cell's extent is shortened so that extent x inverse stays in half's range: cells of slivers, which are long
+// and have no area to speak of.
+float within_half(float extent, float inverse) {
+    constexpr float kMost = 6e4f;
+    return extent > kMost / inverse ? kMost / (extent * inverse) : 1.0f;
+}
+
 void check_cells(const PointSet& points, const Cells& cells, const std::vector<V3f>& moments, std::size_t values) {
     if (cells.size() != points.size()) {
         throw ValueError(str("PointTree: cells must be one per point (", points.size(), "), got ", cells.size(),
@@ -311,16 +318,18 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
     parallel_for(n, 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const std::uint32_t k = keys[i].index;
-            const float area = cells ? cells->areas[k] : points.areas[k], inverse = area > 0.0f ? 1.0f / area : 0.0f;
+            const float area = cells ? cells->areas[k] : points.areas[k], inverse = area > 1e-30f ? 1.0f / area : 0.0f;
             tree.positions[i] = cells ? cells->centroids[k] : points.positions[k];
             tree.areas[i] = area;
             const Covariance covariance =
                 cells ? cells->covariances[k] : disc_covariance(points.areas[k], points.normals[k]);
-            for (int j = 0; j < 6; ++j) tree.footprints[i].covariance[j] = covariance[j] * inverse;
+            const float scale = inverse * within_half(covariance[0] + covariance[1] + covariance[2], inverse);
+            for (int j = 0; j < 6; ++j) tree.footprints[i].covariance[j] = covariance[j] * scale;
             tree.footprints[i].normal = packed_normal(points.normals[k]);
             if (!tree.leans.empty()) {
                 const V3f offset = power_offset(&irradiance[k * groups], &moments[k * groups], groups);
-                for (int j = 0; j < 3; ++j) tree.leans[i][j] = offset[j] * std::sqrt(inverse);
+                const float root = std::sqrt(inverse) * within_half(offset.length(), std::sqrt(inverse));
+                for (int j = 0; j < 3; ++j) tree.leans[i][j] = offset[j] * root;
             }
             for (std::size_t g = 0; g < groups; ++g) tree.irradiance[i * groups + g] = irradiance[k * groups + g];
         }
