@@ -1,7 +1,7 @@
 """One light, told to act on one component at a time: python examples/light_targets.py [OUT.png].
 
-A spire on a floor under a dim sky. From left to right the rim light acts on everything, translucency, specular,
-diffuse.
+A spire on a floor under a grey sky, with a warm light behind it. From left to right the light acts on everything, on
+translucency alone, on specular, on diffuse, on nothing.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ def look_at(eye, target) -> np.ndarray:
 
 def scene_with(multipliers: dict[str, float]) -> fz.Scene:
     scene = fz.Scene()
-    medium = fz.Medium(sigma_s_prime=(25.0, 25.0, 25.0), sigma_a=(4.0, 0.8, 0.3), eta=1.31)
-    ice = scene.add_material("/ice", fz.IceMaterial(medium, refraction=0.0))
-    grey = scene.add_material("/grey", fz.StandardMaterial())
+    medium = fz.Medium(sigma_s_prime=(25.0, 25.0, 25.0), sigma_a=(2.0, 0.4, 0.15), eta=1.31)
+    ice = scene.add_material("/ice", fz.IceMaterial(medium, refraction=0.0, roughness=0.25))
+    grey = scene.add_material("/grey", fz.StandardMaterial(diffuse_color=(0.45, 0.45, 0.45), roughness=0.4))
     scene.add_object("/spire", scene.add_mesh(spire(), "/spire"), ice)
     corners = np.float32([[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]])
     floor = scene.add_mesh(fz.Mesh(corners, np.int32([[0, 1, 2], [0, 2, 3]])), "/floor")
     scene.add_object("/floor", floor, grey)
-    scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.06, 0.08, 0.1], path="/sky"))
-    rim = look_at((1.2, 1.3, -0.9), (0, 0.4, 0))
+    scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.20, 0.23, 0.27], path="/sky"))
+    rim = look_at((0.9, 1.2, -1.0), (0, 0.4, 0))
     off = dict.fromkeys(ALL, 0.0)
     scene.add_light(
-        fz.Light(fz.RectLight(0.6, 0.6), matrix=rim, radiance=[50.0, 46.0, 42.0], path="/rim", **(off | multipliers))
+        fz.Light(fz.RectLight(0.7, 0.7), matrix=rim, radiance=[34.0, 25.0, 15.0], path="/rim", **(off | multipliers))
     )
     scene.camera = fz.Camera(matrix=look_at((0.3, 0.75, 2.6), (0.05, 0.47, 0)), focal_length=35.0)
     return scene
@@ -61,8 +61,8 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
 
 def main(path: str = "light_targets.png") -> None:
     pictures = []
-    for chosen in (ALL, *({name: 1.0} for name in ("translucency", "specular", "diffuse"))):
-        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=32)
+    for chosen in (ALL, *({name: 1.0} for name in ("translucency", "specular", "diffuse")), {}):
+        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=64)
         pictures.append(film["beauty"][:, :, :3])
     write_png(path, np.concatenate(pictures, axis=1))
 

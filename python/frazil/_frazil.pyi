@@ -925,7 +925,7 @@ def bake_occlusion(points: object, scene: RayScene, *, samples: int = 64, seed: 
         For options out of range.
     """
 
-def point_occlusion(points: PointSet, *, distance: float = float('inf'), tolerance: float = 0.05000000074505806) -> tuple:
+def point_occlusion(points: PointSet, *, distance: float = float('inf'), tolerance: float = 0.20000000298023224) -> tuple:
     """
     The same as bake_occlusion from the points alone, without rays: each hides as a disk of its area.
 

@@ -85,7 +85,34 @@ TEST_CASE("environment: wherever there is light there is density, beside a brigh
         estimate += double(env.eval(d).z) / double(pdf) / kCount;
     }
     CHECK(estimate == doctest::Approx(integral).epsilon(5e-3));
-    CHECK(env.average().z * 4 * kPiD == doctest::Approx(integral).epsilon(0.02));
+    CHECK(double(env.brightness()) * 4 * kPiD == doctest::Approx(0.0722 * integral).epsilon(0.02));
+}
+
+TEST_CASE("environment: the estimate of irradiance is exact up to degree 2, for a smooth sky of any orientation") {
+    // L = 1 + a.d + (b.d)², whose irradiance is known.
+    const V3f a(0.2f, 0.3f, -0.4f), b(0.5f, -0.7f, 0.3f);
+    constexpr int kHeight = 128;
+    std::vector<Rgb> pixels(2 * kHeight * kHeight);
+    double mean = 0.0;
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < 2 * kHeight; ++x) {
+            const double theta = kPiD * (y + 0.5) / kHeight, phi = kPiD * (x + 0.5) / kHeight;
+            const V3f d(float(std::sin(theta) * std::sin(phi)), float(std::cos(theta)),
+                        float(-std::sin(theta) * std::cos(phi)));
+            const float value = 1.0f + a.dot(d) + b.dot(d) * b.dot(d);
+            pixels[std::size_t(y) * 2 * kHeight + std::size_t(x)] = Rgb(value);
+            mean += double(value) * std::sin(theta) * kPiD / (4.0 * kHeight * kHeight);
+        }
+    }
+    const Environment env(2 * kHeight, kHeight, pixels, "/env");
+    CHECK(double(env.brightness()) == doctest::Approx(mean).epsilon(1e-3));
+    for (const V3f& n : {V3f(1, 0, 0), V3f(0, 1, 0), V3f(0, 0, -1), V3f(0.48f, 0.6f, 0.64f)}) {
+        // (b.d)² = |b|²/3 + (b.d)² - |b|²/3: degrees 0 and 2, scaled by pi and pi/4.
+        const double square = double(b.dot(b)) / 3.0, along = double(b.dot(n)) * double(b.dot(n));
+        const double expected =
+            kPiD * (1.0 + square) + 2.0 * kPiD / 3.0 * double(a.dot(n)) + kPiD / 4.0 * (along - square);
+        CHECK(double(env.irradiance(n) * env.brightness()) == doctest::Approx(expected).epsilon(2e-3));
+    }
 }
 
 TEST_CASE("environment: black and negative images still sample; broken ones are refused") {
@@ -94,7 +121,7 @@ TEST_CASE("environment: black and negative images still sample; broken ones are 
     black.sample(V2f(0.3f, 0.9f), pdf);
     CHECK(pdf == doctest::Approx(1.0 / (4 * kPiD)).epsilon(1e-3));
     const Environment negative(8, 4, std::vector<Rgb>(32, Rgb(-1.0f)), "/env");
-    CHECK(negative.average().x == doctest::Approx(-1.0));
+    CHECK(negative.brightness() == doctest::Approx(1.0));
     negative.sample(V2f(0.0f, 0.99999994f), pdf);
     CHECK(pdf > 0.0f);
 

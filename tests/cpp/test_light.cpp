@@ -83,7 +83,8 @@ TEST_CASE("light: the density of sample() is the one it tells, and integrates to
             std::holds_alternative<DomeLight>(c.light.shape) || std::holds_alternative<DistantLight>(c.light.shape);
         // Cells over a cone about the light, so that a far one fills them too; the side that shines faces the point.
         V3f position = c.position;
-        if (light.importance(position) == 0.0f) position = c.light.light_to_world.translation() * 2.0f - position;
+        if (light.importance(position, V3f(0.0f)) == 0.0f)
+            position = c.light.light_to_world.translation() * 2.0f - position;
         const auto sample = [&](const V2f& u, V3f& d) {
             LightSample s;
             light.sample(position, {&u, 1}, {&s, 1});
@@ -124,7 +125,8 @@ TEST_CASE("light: intersect() finds what sample() chose, with the same density, 
     for (const Case& c : cases()) {
         const WorldLight light(c.light);
         V3f position = c.position;
-        if (light.importance(position) == 0.0f) position = c.light.light_to_world.translation() * 2.0f - position;
+        if (light.importance(position, V3f(0.0f)) == 0.0f)
+            position = c.light.light_to_world.translation() * 2.0f - position;
         CAPTURE(c.name);
         int found = 0;
         for (std::uint32_t i = 0; i < 256; ++i) {

@@ -85,13 +85,44 @@ TEST_CASE("light picker: probabilities sum to one, and are those of pick(), for 
             std::vector<double> counted(all.size(), 0.0);
             constexpr int kCount = 1 << 15;
             for (int i = 0; i < kCount; ++i) {
-                const LightPick pick = picker.pick(receiver, weights, (float(i) + 0.5f) / kCount);
+                const LightPick pick = picker.pick_one(receiver, weights, (float(i) + 0.5f) / kCount);
                 REQUIRE(pick.light >= 0);
                 CHECK(double(pick.probability) == doctest::Approx(expected[std::size_t(pick.light)]).epsilon(1e-3));
                 counted[std::size_t(pick.light)] += 1.0 / kCount;
             }
             for (std::size_t i = 0; i < all.size(); ++i) CHECK(std::abs(counted[i] - expected[i]) < 2.5 / kCount);
         }
+    }
+}
+
+TEST_CASE("light picker: several lights for one receiver, each as often as it is told") {
+    std::vector<Light> lights = swarm(40);
+    lights.push_back(make_light(DomeLight{}));
+    lights.back().radiance = Rgb(0.05f);
+    lights.push_back(make_light(DistantLight{1.0f}));
+    for (std::size_t i = 0; i < lights.size(); ++i) lights[i].group = i % 7 == 0 ? "few" : "many";
+    const LightSampler sampler(lights);
+    for (const float asked : {1.0f, 1.5f, 3.0f, 8.0f}) {
+        const LightReceiver receiver{V3f(0.3f, 0.2f, 0.0f), V3f(0, 0, 1), kNoObject, asked};
+        std::vector<double> counted(lights.size(), 0.0), told(lights.size(), 0.0);
+        std::size_t most = 0;
+        constexpr int kCount = 1 << 14;
+        std::vector<LightSample> samples;
+        for (int i = 0; i < kCount; ++i) {
+            sampler.sample(receiver, (float(i) + 0.5f) / kCount, V2f(0.5f), samples);
+            most = std::max(most, samples.size());
+            std::vector<int> twice;
+            for (const LightSample& sample : samples) {
+                const auto light = std::size_t(sample.light);
+                CHECK(std::find(twice.begin(), twice.end(), sample.light) == twice.end());
+                twice.push_back(sample.light);
+                counted[light] += 1.0 / kCount;
+                const LightSample alone = sampler.sample_one(sample.light, receiver.position, V2f(0.5f));
+                told[light] = double(sample.pdf / alone.pdf);
+            }
+        }
+        CHECK(double(most) < double(asked) + 2.5);
+        for (std::size_t i = 0; i < lights.size(); ++i) CHECK(std::abs(counted[i] - told[i]) < 4.0 / kCount);
     }
 }
 

@@ -78,6 +78,22 @@ def test_shapes(stage, kind, sizes):
         assert getattr(light.shape, name) == pytest.approx(value)
 
 
+@pytest.mark.parametrize(("kind", "hint"), [("SphereLight", "treatAsPoint"), ("CylinderLight", "treatAsLine")])
+def test_points_and_lines_keep_their_size_or_get_a_small_one(stage, kind, hint):
+    prim = stage.DefinePrim("/Light", kind)
+    prim.GetAttribute(hint).Set(True)
+    prim.GetAttribute("inputs:radius").Set(2.0)
+    assert read_light(stage).shape.radius == 2.0
+    prim.GetAttribute("inputs:radius").Set(0.0)
+    prim.GetAttribute("inputs:normalize").Set(True)
+    light = read_light(stage)
+    assert light.shape.radius * light.matrix[0, 0] == pytest.approx(1e-3)
+    prim.GetAttribute("inputs:normalize").Set(False)
+    assert any(w.startswith(f"/Light: {hint} with radius 0") for w in load(stage).warnings)
+    prim.GetAttribute(hint).Set(False)
+    assert any("radius must be > 0" in w for w in load(stage).warnings)
+
+
 def test_distant_lights_keep_their_default_intensity(stage):
     UsdLux.DistantLight.Define(stage, "/Light")
     np.testing.assert_allclose(read_light(stage).radiance, 50000)
@@ -233,6 +249,13 @@ def test_images_that_darken_are_named(stage, tmp_path):
     scene = load(stage)
     assert any("/Sky: " in w and "96 negative values" in w for w in scene.warnings)
     assert scene.lights[0].shape.has_image
+
+
+def test_an_empty_light_group_is_the_default_one_and_odd_names_are_refused(stage):
+    prim = UsdLux.SphereLight.Define(stage, "/Light").GetPrim()
+    group = prim.CreateAttribute("frazil:lightGroup", Sdf.ValueTypeNames.String)
+    group.Set("")
+    assert read_light(stage).group == ""
 
 
 def test_invisible_lights_are_off(stage):

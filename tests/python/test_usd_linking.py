@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
-from usd_stages import add_quad, load
+from usd_stages import add_mesh, add_quad, load
 
 import frazil as fz
 
@@ -144,6 +144,14 @@ def test_a_mesh_light_shines_from_its_object(stage):
     assert not light.shape.is_material
     np.testing.assert_allclose(light.radiance, 5)
     assert not scene.warnings
+
+
+def test_mesh_lights_without_area_are_left_out(stage):
+    mesh = add_mesh(stage, "/World/B/flat", [(0, 0, 0), (1, 0, 0), (2, 0, 0)], [3], [0, 1, 2])
+    UsdLux.MeshLightAPI.Apply(mesh.GetPrim())
+    scene = load(stage)
+    assert not any(isinstance(item.shape, fz.MeshLight) for item in scene.lights)
+    assert any(w.startswith("/World/B/flat: area must be > 0") for w in scene.warnings), scene.warnings
 
 
 def test_emissive_materials_become_lights(stage):

@@ -25,6 +25,7 @@ from .light_images import read_light_image
 from .linking import LinkReader
 
 _GREY_DOME = 0.5
+_POINT_RADIUS = 1e-3  # metres, of lights that are told to be points or lines
 
 # The dome of UsdLuxDomeLight_1 may stand on z: its own frame, pole +y, turned by 90 degrees about x.
 _POLE_Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
@@ -69,7 +70,8 @@ class LightReader:
         if _get(self._context, prim, "light:materialSyncMode", "materialGlowTintsLight") == "materialGlowTintsLight":
             factors = self._scene.triangle_emission(index)
         mesh = self._scene.mesh(self._scene.objects[index].mesh)
-        if not len(mesh.triangles):
+        if not mesh.area > 0.0:
+            self._context.warn(path, "area must be > 0, got 0. The light is left out.")
             return
         is_two_sided = bool(self._context.get(UsdGeom.Gprim(prim).GetDoubleSidedAttr(), False))
         self._add(prim, MeshLight(mesh, index, factors, is_two_sided=is_two_sided), matrix, path)
@@ -86,8 +88,11 @@ class LightReader:
             if index in self._shining:
                 continue
             item = self._scene.objects[index]
+            mesh = self._scene.mesh(item.mesh)
+            if not mesh.area > 0.0:
+                continue  # nothing of it is seen either
             shape = MeshLight(
-                self._scene.mesh(item.mesh),
+                mesh,
                 index,
                 self._scene.triangle_emission(index),
                 is_two_sided=True,
@@ -164,6 +169,7 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
         context.warn(prim.GetPath(), f"lights of type {kind or 'none'} are not supported. It is left out.")
         return None
     values = [_number(context, prim, name, default) for name, default in sizes]
+    values = _hinted_sizes(context, prim, kind, values)
     for (name, _), value in zip(sizes, values, strict=True):
         if value <= 0:
             context.warn(prim.GetPath(), f"{name} must be > 0, got {value}. The light is left out.")
@@ -171,6 +177,21 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
     if kind == "RectLight":
         return RectLight(*values, _read_image(context, prim, "It shines evenly."), str(prim.GetPath()))
     return {"DiskLight": DiskLight, "SphereLight": SphereLight, "CylinderLight": CylinderLight}[kind](*values)
+
+
+def _hinted_sizes(context: ReadContext, prim: Usd.Prim, kind: str, values: list[float]) -> list[float]:
+    # treatAsPoint and treatAsLine let a renderer that has no areas leave them out. Ours has: only lights whose radius is 0
+    # for that reason are given a small one, which with `normalize` is as strong.
+    hint = {"SphereLight": "treatAsPoint", "CylinderLight": "treatAsLine"}.get(kind)
+    if hint is None or not context.get(prim.GetAttribute(hint), False) or values[-1] != 0.0:
+        return values
+    radius = _POINT_RADIUS / context.meters_per_unit
+    if not _get(context, prim, "normalize", False):
+        context.warn(
+            prim.GetPath(),
+            f"{hint} with radius 0 has no area to shine from: normalize should be on. A radius of {radius:g} is used.",
+        )
+    return [*values[:-1], radius]
 
 
 def _read_image(context: ReadContext, prim: Usd.Prim, instead: str) -> np.ndarray | None:

@@ -165,7 +165,7 @@ void bind_lighting(nb::module_& module) {
             }
             return occlusion_arrays(std::move(*result));
         },
-        "points"_a, nb::kw_only(), "distance"_a = std::numeric_limits<float>::infinity(), "tolerance"_a = 0.05f,
+        "points"_a, nb::kw_only(), "distance"_a = std::numeric_limits<float>::infinity(), "tolerance"_a = 0.2f,
         "The same as bake_occlusion from the points alone, without rays: each hides as a disk of its area.\n\n"
         "`tolerance` is the solid angle in steradian below which a cluster of points counts as one disk.");
 

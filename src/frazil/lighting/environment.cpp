@@ -91,7 +91,6 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
     conditional_cdf_.resize(rows * (w + 1));
     guides_.resize((rows + 1) * (kGuides + 1));
     std::vector<double> row_weight(rows);
-    std::vector<V3d> row_sum(rows, V3d(0.0));
     parallel_for(rows, 16, [&](std::size_t begin, std::size_t end) {
         std::vector<double> column(w), cell(w);
         for (std::size_t y = begin; y < end; ++y) {
@@ -99,22 +98,18 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
             const Rgb* below = &pixels_[std::min(y, rows - 2) * w];
             for (std::size_t x = 0; x < w; ++x) {
                 column[x] = double(weight_of(above[x])) + double(weight_of(below[x]));
-                row_sum[y] += (V3d(above[x]) + V3d(below[x])) * 0.5;
             }
             for (std::size_t x = 0; x < w; ++x) cell[x] = 0.25 * (column[x] + column[x + 1 == w ? 0 : x + 1]);
             row_weight[y] = finish_cdf(&conditional_cdf_[y * (w + 1)], width, cell);
             make_guide(&conditional_cdf_[y * (w + 1)], width, &guides_[y * (kGuides + 1)]);
         }
     });
-    V3d average(0.0);
     double total = 0.0;
     for (std::size_t y = 0; y < rows; ++y) {
         const double share = 0.5 * (double(row_cosine_[y]) - double(row_cosine_[y + 1]));
         row_weight[y] *= share;
         total += row_weight[y];
-        average += row_sum[y] * (share / double(w));
     }
-    average_ = Rgb(average);
     // Each cell's weight is the exact mean of its density, so that one number normalises all.
     integral_ = static_cast<float>(4.0 * 3.14159265358979323846 * total / double(w));
     if (total == 0.0) {
@@ -123,6 +118,57 @@ Environment::Environment(int width, int height, std::vector<Rgb> pixels, const s
     marginal_cdf_.resize(rows + 1);
     finish_cdf(marginal_cdf_.data(), int(rows), row_weight);
     make_guide(marginal_cdf_.data(), int(rows), &guides_[rows * (kGuides + 1)]);
+    if (total > 0.0) set_moments();
+}
+
+void Environment::set_moments() {
+    const std::size_t w = std::size_t(width_), h = std::size_t(height_);
+    constexpr double kPiD = 3.14159265358979323846;
+    std::vector<double> cosines(w), sines(w);
+    for (std::size_t x = 0; x < w; ++x) {
+        const double azimuth = 2.0 * kPiD * (double(x) + 0.5) / double(w);
+        cosines[x] = std::cos(azimuth), sines[x] = std::sin(azimuth);
+    }
+    using Moments = std::array<double, 9>;
+    std::vector<Moments> of_row(h);
+    parallel_for(h, 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t y = begin; y < end; ++y) {
+            double sum = 0.0, c = 0.0, s = 0.0, cc = 0.0, cs = 0.0;
+            for (std::size_t x = 0; x < w; ++x) {
+                const double weight = double(weight_of(pixels_[y * w + x]));
+                const double wc = weight * cosines[x];
+                sum += weight, c += wc, s += weight * sines[x];
+                cc += wc * cosines[x], cs += wc * sines[x];
+            }
+            const double theta = kPiD * (double(y) + 0.5) / double(h), sine = std::sin(theta), cosine = std::cos(theta);
+            const double scale = 2.0 * kPiD / double(w) * 2.0 * sine * std::sin(0.5 * kPiD / double(h));
+            const double up = sine * cosine * scale, flat = sine * sine * scale;
+            of_row[y] = {sine * scale * s,
+                         cosine * scale * sum,
+                         -sine * scale * c,
+                         flat * (sum - cc),
+                         cosine * cosine * scale * sum,
+                         flat * cc,
+                         up * s,
+                         -flat * cs,
+                         -up * c};
+        }
+    });
+    Moments total{};
+    for (const Moments& row : of_row) {
+        for (std::size_t k = 0; k < total.size(); ++k) total[k] += row[k];
+    }
+    const double mean = double(brightness());
+    for (std::size_t k = 0; k < 3; ++k) first_moment_[int(k)] = static_cast<float>(total[k] / mean);
+    for (std::size_t k = 0; k < 6; ++k) second_moment_[k] = static_cast<float>(total[k + 3] / mean);
+}
+
+float Environment::irradiance(const V3f& n) const {
+    const auto& [xx, yy, zz, xy, xz, yz] = second_moment_;
+    const float square =
+        n.x * n.x * xx + n.y * n.y * yy + n.z * n.z * zz + 2.0f * (n.x * n.y * xy + n.x * n.z * xz + n.y * n.z * yz);
+    const float whole = 4.0f * kPi;  // the moment of degree 0
+    return 0.25f * whole + 0.5f * n.dot(first_moment_) + 5.0f / 32.0f * (3.0f * square - whole);
 }
 
 void Environment::set_corners(Cell& cell) const {

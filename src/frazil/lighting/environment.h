@@ -9,6 +9,7 @@
 // Not: mip-maps.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,10 +41,14 @@ class Environment {
     int width() const { return width_; }
     int height() const { return height_; }
     const std::vector<Rgb>& pixels() const { return pixels_; }
-    // Mean radiance over the sphere.
-    Rgb average() const { return average_; }
+    // Mean absolute luminance over the sphere.
+    float brightness() const { return 0.25f * kInvPi * integral_; }
+    // An estimate of the irradiance on a plane of that normal, over brightness(): spherical harmonics up to degree 2
+    // [Ramamoorthi2001] of the absolute luminance. Errors of a tenth are usual; below 0 beside a lone sun.
+    float irradiance(const V3f& normal) const;
 
   private:
+    void set_moments();
     // The rectangle between four pixel centres: columns column, column + 1 (around the seam), rows row - 1, row (half a
     // cell at the poles). `across` and `down` in [0, 1] are the place in it, `down` linear in the angle.
     struct Cell {
@@ -69,7 +74,9 @@ class Environment {
     std::vector<std::uint32_t> guides_;  // where a search in each conditional row, then the marginal, begins
     std::vector<float> row_cosine_;      // cos(theta) at the upper edge of each row of cells; height + 2
     float integral_ = 0.0f;              // of the absolute luminance over the sphere
-    Rgb average_;
+    // Moments of the absolute luminance over the sphere, over brightness(): directions, and their products xx yy zz xy xz yz.
+    V3f first_moment_ = V3f(0.0f);
+    std::array<float, 6> second_moment_{};
 };
 
 }  // namespace frazil

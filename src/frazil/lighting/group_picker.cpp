@@ -26,25 +26,44 @@ void GroupPicker::weigh(const LightReceiver& receiver, Weights& weights) const {
     }
 }
 
-LightPick GroupPicker::pick(const LightReceiver& receiver, const Weights& weights, float u) const {
-    if (weights.count == 0) return {};
-    const float scaled = u * static_cast<float>(weights.count);
-    int left = std::min(static_cast<int>(scaled), weights.count - 1);
-    const float rest = std::clamp(scaled - static_cast<float>(left), 0.0f, 0.99999994f);
+// Groups are taken evenly, as many as the receiver asks for; where these are all of them, each picks its part of the rest.
+float GroupPicker::group_share(const LightReceiver& receiver, const Weights& weights) {
+    return std::min(1.0f, receiver.picks / static_cast<float>(weights.count));
+}
+
+LightReceiver GroupPicker::in_group(const LightReceiver& receiver, const Weights& weights) {
+    LightReceiver result = receiver;
+    result.picks = std::max(1.0f, receiver.picks / static_cast<float>(weights.count));
+    return result;
+}
+
+void GroupPicker::pick(const LightReceiver& receiver, const Weights& weights, float u,
+                       std::vector<LightPick>& picks) const {
+    picks.clear();
+    if (weights.count == 0) return;
+    const LightReceiver own = in_group(receiver, weights);
+    const double share = double(group_share(receiver, weights));
+    // A comb with teeth at u, u + 1, ... over the shares laid end to end.
+    double tooth = double(u);
+    int left = weights.count;
     for (std::size_t g = 0; g < pickers_.size(); ++g) {
-        if (!(weights.groups[g].total > 0.0f) || left-- > 0) continue;
-        LightPick picked = pickers_[g].pick(receiver, weights.groups[g], rest);
-        picked.probability /= static_cast<float>(weights.count);
-        return picked;
+        if (!(weights.groups[g].total > 0.0f)) continue;
+        const bool is_last = --left == 0 && picks.empty();  // whatever rounding says
+        if (tooth < share || is_last) {
+            const std::size_t begin = picks.size();
+            pickers_[g].pick(own, weights.groups[g], std::min(float(tooth / share), kBelowOne), picks);
+            for (std::size_t i = begin; i < picks.size(); ++i) picks[i].probability *= float(share);
+            tooth += 1.0;
+        }
+        tooth -= share;
     }
-    return {};
 }
 
 float GroupPicker::probability(const LightReceiver& receiver, const Weights& weights, int light) const {
     const int g = picker_of_light_[std::size_t(light)];
     if (g < 0 || weights.count == 0) return 0.0f;
-    return pickers_[std::size_t(g)].probability(receiver, weights.groups[std::size_t(g)], light) /
-           static_cast<float>(weights.count);
+    return group_share(receiver, weights) *
+           pickers_[std::size_t(g)].probability(in_group(receiver, weights), weights.groups[std::size_t(g)], light);
 }
 
 }  // namespace frazil

@@ -1,4 +1,4 @@
-// The choice of one light for a receiver when lights come in groups: a group first, evenly, then a light of it by power.
+// The choice of lights for a receiver when lights come in groups: groups first, evenly, then lights of them by power.
 // Model: so every light group's layer is sampled alike, and what a group is scaled by changes no choice: layers of groups are
 //   linear in the groups' intensities sample by sample, not only in the mean.
 // Units: probabilities.
@@ -23,11 +23,15 @@ class GroupPicker {
         int count = 0;  // groups with weight above 0
     };
     void weigh(const LightReceiver& receiver, Weights& weights) const;
-    LightPick pick(const LightReceiver& receiver, const Weights& weights, float u) const;
+    // As many lights as the receiver asks for, about; none of them twice.
+    void pick(const LightReceiver& receiver, const Weights& weights, float u, std::vector<LightPick>& picks) const;
     // With what probability pick() gives this light.
     float probability(const LightReceiver& receiver, const Weights& weights, int light) const;
 
   private:
+    static float group_share(const LightReceiver& receiver, const Weights& weights);
+    static LightReceiver in_group(const LightReceiver& receiver, const Weights& weights);
+
     std::vector<LightPicker> pickers_;  // by group
     std::vector<int> picker_of_light_;  // -1 where no picker has it
 };

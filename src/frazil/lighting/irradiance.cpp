@@ -147,7 +147,10 @@ class RayMaker {
         }
         const WorldLight& world_light = lights_.world_light(task.light);
         if (!lights_.is_linked(task.light, object_of(point))) return;
-        if (work.places.size() == 1 && world_light.importance(work.places[0].position) == 0.0f) return;
+        if (const Place& only = work.places[0];
+            work.places.size() == 1 && world_light.importance(only.position, only.normal) == 0.0f) {
+            return;
+        }
 
         const std::size_t n = whole_.size();
         work.u.resize(n);
@@ -267,7 +270,7 @@ class RayMaker {
             crowd.weigh(receiver, work.weights);
             for (std::size_t i = first; i < first + count; ++i) {
                 Sampler random(seed, point, work.order[i]);
-                const LightPick pick = crowd.pick(receiver, work.weights, random.next_1d());
+                const LightPick pick = crowd.pick_one(receiver, work.weights, random.next_1d());
                 if (pick.light < 0) return;
                 LightSample& sample = work.samples[i];
                 sample = lights_.sample_one(pick.light, receiver.position, random.next_2d());

@@ -9,12 +9,6 @@ float safe_sine(float cosine) {
     return std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
 }
 
-// Cosine of max(0, a - b) for angles in [0, pi].
-float cos_difference(float cos_a, float cos_b) {
-    if (cos_a >= cos_b) return 1.0f;
-    return std::min(1.0f, cos_a * cos_b + safe_sine(cos_a) * safe_sine(cos_b));
-}
-
 // Cosine of half the angle under which the ball about the box is seen; -1 from inside.
 float cos_subtended(float distance2, float radius2) {
     if (distance2 <= radius2) return -1.0f;
@@ -41,6 +35,11 @@ Cone merged(Cone a, Cone b) {
 }
 
 }  // namespace
+
+float cos_difference(float cos_a, float cos_b) {
+    if (cos_a >= cos_b) return 1.0f;
+    return std::min(1.0f, cos_a * cos_b + safe_sine(cos_a) * safe_sine(cos_b));
+}
 
 LightBounds scaled(const LightBounds& bounds, float scale) {
     LightBounds result = bounds;

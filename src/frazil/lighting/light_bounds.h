@@ -32,6 +32,9 @@ LightBounds scaled(const LightBounds& bounds, float scale);
 // Both together; a light without power does not widen the other.
 LightBounds merged(const LightBounds& a, const LightBounds& b);
 
+// Cosine of max(0, a - b) for angles in [0, pi].
+float cos_difference(float cos_a, float cos_b);
+
 // The cosine of the angle between a receiver's normal and the nearest place of the ball about `box`, no less than 0; 1
 // where the normal is zero (a receiver of light from all sides).
 float receiving_cosine(const Box3f& box, const V3f& position, const V3f& normal);

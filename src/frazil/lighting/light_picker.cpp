@@ -30,27 +30,17 @@ bool crosses(const Box3f& box, const V3f& origin, const V3f& inverse, float t_ma
 LightPicker::LightPicker(const std::vector<WorldLight>& lights, std::span<const PickEntry> entries,
                          const LinkTable& links, std::span<const std::uint32_t> link_of_light)
     : lights_(lights), links_(links), leaf_of_light_(lights.size(), -1), infinite_of_light_(lights.size(), -1) {
-    // One tree, and one list of lights from infinity, for each link set.
+    // One tree for each link set.
     std::map<std::uint32_t, std::vector<PickEntry>> finite;
-    std::map<std::uint32_t, Infinite> infinite;
     for (const PickEntry& entry : entries) {
         const WorldLight& light = lights[std::size_t(entry.light)];
         const std::uint32_t link = link_of_light[std::size_t(entry.light)];
         if (light.is_finite()) {
             if (light.bounds().power > 0.0f) finite[link].push_back(entry);
-            continue;
+        } else if (light.importance(V3f(0.0f), V3f(0.0f)) * entry.scale > 0.0f) {
+            infinite_of_light_[std::size_t(entry.light)] = int(infinite_.size());
+            infinite_.push_back({entry.light, entry.scale, link});
         }
-        const float weight = light.importance(V3f(0.0f)) * entry.scale;
-        if (!(weight > 0.0f)) continue;
-        Infinite& list = infinite[link];
-        list.link = link;
-        list.lights.push_back(entry.light);
-        list.weights.push_back(weight);
-        list.total += weight;
-    }
-    for (auto& [link, list] : infinite) {
-        for (const int light : list.lights) infinite_of_light_[std::size_t(light)] = int(infinite_.size());
-        infinite_.push_back(std::move(list));
     }
     for (auto& [link, list] : finite) {
         nodes_.reserve(nodes_.size() + 2 * list.size());
@@ -140,8 +130,7 @@ int LightPicker::build(std::span<PickEntry> entries, std::uint32_t link, int dep
 float LightPicker::node_importance(int index, const LightReceiver& receiver) const {
     const Node& node = nodes_[std::size_t(index)];
     if (node.light < 0) return importance(node.bounds, receiver.position, receiver.normal);
-    return node.scale * lights_[std::size_t(node.light)].importance(receiver.position) *
-           receiving_cosine(node.bounds.box, receiver.position, receiver.normal);
+    return node.scale * lights_[std::size_t(node.light)].importance(receiver.position, receiver.normal);
 }
 
 float LightPicker::left_share(const Node& node, const LightReceiver& receiver) const {
@@ -159,52 +148,74 @@ void LightPicker::weigh(const LightReceiver& receiver, Weights& weights) const {
     for (const int node : cut_) {
         add(nodes_[std::size_t(node)].link, [&] { return node_importance(node, receiver); });
     }
-    for (const Infinite& list : infinite_) add(list.link, [&] { return list.total; });
+    for (const Infinite& item : infinite_) {
+        add(item.link, [&] {
+            return item.scale * lights_[std::size_t(item.light)].importance(receiver.position, receiver.normal);
+        });
+    }
 }
 
-LightPick LightPicker::pick(const LightReceiver& receiver, const Weights& weights, float u) const {
-    if (!(weights.total > 0.0f)) return {};
-    // Of weights with a sum: the one that holds `left`, which becomes the place in it, in [0, 1).
-    const auto choose = [](const std::vector<float>& values, float& left) {
-        int slot = -1;
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            if (values[i] == 0.0f) continue;
-            slot = int(i);
-            if (left < values[i]) break;
-            left -= values[i];
-        }
-        left = std::clamp(left / values[std::size_t(slot)], 0.0f, 0.99999994f);
-        return slot;
-    };
-    float left = u * weights.total;
-    const int slot = choose(weights.values, left);
-    float probability = weights.values[std::size_t(slot)] / weights.total;
-    if (std::size_t(slot) >= cut_.size()) {
-        const Infinite& list = infinite_[std::size_t(slot) - cut_.size()];
-        left *= list.total;
-        const int chosen = choose(list.weights, left);
-        return {list.lights[std::size_t(chosen)], probability * list.weights[std::size_t(chosen)] / list.total};
-    }
-    int node = cut_[std::size_t(slot)];
+LightPick LightPicker::pick_in_slot(const LightReceiver& receiver, std::size_t slot, float left) const {
+    if (slot >= cut_.size()) return {infinite_[slot - cut_.size()].light, 1.0f};
+    int node = cut_[slot];
+    float probability = 1.0f;
     while (nodes_[std::size_t(node)].left >= 0) {
         const Node& parent = nodes_[std::size_t(node)];
         const float share = left_share(parent, receiver);
         const bool is_left = left < share;
         node = is_left ? parent.left : parent.right;
         left = is_left ? left / share : (left - share) / (1.0f - share);
-        left = std::clamp(left, 0.0f, 0.99999994f);
+        left = std::clamp(left, 0.0f, kBelowOne);
         probability *= is_left ? share : 1.0f - share;
     }
     return {nodes_[std::size_t(node)].light, probability};
 }
 
+LightPick LightPicker::pick_one(const LightReceiver& receiver, const Weights& weights, float u) const {
+    if (!(weights.total > 0.0f)) return {};
+    float left = u * weights.total;
+    int slot = -1;
+    for (std::size_t i = 0; i < weights.values.size(); ++i) {
+        if (weights.values[i] == 0.0f) continue;
+        slot = int(i);
+        if (left < weights.values[i]) break;
+        left -= weights.values[i];
+    }
+    const float weight = weights.values[std::size_t(slot)];
+    LightPick pick = pick_in_slot(receiver, std::size_t(slot), std::clamp(left / weight, 0.0f, kBelowOne));
+    pick.probability *= weight / weights.total;
+    return pick;
+}
+
+void LightPicker::pick(const LightReceiver& receiver, const Weights& weights, float u,
+                       std::vector<LightPick>& picks) const {
+    if (!(receiver.picks > 1.0f)) {
+        if (const LightPick pick = pick_one(receiver, weights, u); pick.light >= 0) picks.push_back(pick);
+        return;
+    }
+    if (!(weights.total > 0.0f)) return;
+    // A comb with teeth at u, u + 1, ... over the slots' shares laid end to end; none is longer than 1.
+    double tooth = double(u);
+    for (std::size_t slot = 0; slot < weights.values.size(); ++slot) {
+        const double share = double(slot_share(receiver, weights, slot));
+        if (tooth < share) {
+            LightPick pick = pick_in_slot(receiver, slot, std::min(float(tooth / share), kBelowOne));
+            pick.probability *= float(share);
+            picks.push_back(pick);
+            tooth += 1.0;
+        }
+        tooth -= share;
+    }
+}
+
+float LightPicker::slot_share(const LightReceiver& receiver, const Weights& weights, std::size_t slot) {
+    return std::min(1.0f, receiver.picks * weights.values[slot] / weights.total);
+}
+
 float LightPicker::probability(const LightReceiver& receiver, const Weights& weights, int light) const {
     if (!(weights.total > 0.0f)) return 0.0f;
-    if (const int list_index = infinite_of_light_[std::size_t(light)]; list_index >= 0) {
-        const Infinite& list = infinite_[std::size_t(list_index)];
-        const auto found = std::find(list.lights.begin(), list.lights.end(), light) - list.lights.begin();
-        const float weight = weights.values[cut_.size() + std::size_t(list_index)];
-        return weight / weights.total * (list.weights[std::size_t(found)] / list.total);
+    if (const int infinite = infinite_of_light_[std::size_t(light)]; infinite >= 0) {
+        return slot_share(receiver, weights, cut_.size() + std::size_t(infinite));
     }
     int node = leaf_of_light_[std::size_t(light)];
     if (node < 0) return 0.0f;
@@ -215,7 +226,7 @@ float LightPicker::probability(const LightReceiver& receiver, const Weights& wei
         probability *= nodes_[std::size_t(parent)].left == node ? share : 1.0f - share;
         node = parent;
     }
-    return probability * weights.values[std::size_t(slot_of_node_[std::size_t(node)])] / weights.total;
+    return probability * slot_share(receiver, weights, std::size_t(slot_of_node_[std::size_t(node)]));
 }
 
 void LightPicker::find_along(const V3f& origin, const V3f& direction, float t_max, std::vector<int>& lights) const {

@@ -1,6 +1,7 @@
 // The choice of one light among many for one receiver.
-// Model: a tree of light bounds [ContyEstevez2018], one for each set of linked objects, and lights from infinity by
-//   their power. The choice begins among the nodes of a fixed cut, so that up to kCut lights are weighed one by one.
+// Model: a tree of light bounds [ContyEstevez2018], one for each set of linked objects. The choice begins among the nodes
+//   of a fixed cut, so that up to kCut lights are weighed one by one; lights from infinity always are. Several choices
+//   for one receiver are systematic: what has its share of the weight or more is chosen for certain.
 // Units: probabilities.
 // Valid: thread-safe after construction; the same for any number of threads. Every light that can reach a receiver that
 //   it is linked to has a probability above 0; other objects' lights have none. One float chooses: probabilities below
@@ -24,6 +25,7 @@ struct LightReceiver {
     V3f position = V3f(0.0f);
     V3f normal = V3f(0.0f);  // unit length, on the side that receives; zero = from all sides
     std::uint32_t object = kNoObject;
+    float picks = 1.0f;  // how many lights it asks for at a time, about; >= 1
 };
 
 // A light of a picker, and what its power is multiplied by (absolute, above 0).
@@ -32,9 +34,11 @@ struct PickEntry {
     float scale = 1.0f;
 };
 
+inline constexpr float kBelowOne = 0.99999994f;  // the largest of numbers in [0, 1)
+
 struct LightPick {
-    int light = -1;  // none
-    float probability = 0.0f;
+    int light = -1;            // none
+    float probability = 0.0f;  // of being among those that are chosen at a time
 };
 
 class LightPicker {
@@ -53,7 +57,10 @@ class LightPicker {
         float total = 0.0f;
     };
     void weigh(const LightReceiver& receiver, Weights& weights) const;
-    LightPick pick(const LightReceiver& receiver, const Weights& weights, float u) const;
+    // Append as many lights as the receiver asks for, or fewer; none of them twice.
+    void pick(const LightReceiver& receiver, const Weights& weights, float u, std::vector<LightPick>& picks) const;
+    // One light, whatever the receiver asks for, as pick() gives a receiver that asks for one.
+    LightPick pick_one(const LightReceiver& receiver, const Weights& weights, float u) const;
     // With what probability pick() gives this light.
     float probability(const LightReceiver& receiver, const Weights& weights, int light) const;
 
@@ -62,7 +69,7 @@ class LightPicker {
 
     // Append the lights from infinity.
     void append_infinite(std::vector<int>& lights) const {
-        for (const Infinite& list : infinite_) lights.insert(lights.end(), list.lights.begin(), list.lights.end());
+        for (const Infinite& item : infinite_) lights.push_back(item.light);
     }
 
   private:
@@ -73,26 +80,28 @@ class LightPicker {
         float scale = 1.0f;
         std::uint32_t link = 0;
     };
-    // Lights from infinity that share a link set.
     struct Infinite {
+        int light = -1;
+        float scale = 1.0f;
         std::uint32_t link = 0;
-        std::vector<int> lights;
-        std::vector<float> weights;
-        float total = 0.0f;
     };
     int build(std::span<PickEntry> entries, std::uint32_t link, int depth);
     float node_importance(int node, const LightReceiver& receiver) const;
     // The share of a node's left child.
     float left_share(const Node& node, const LightReceiver& receiver) const;
+    // The probability that a slot is chosen.
+    static float slot_share(const LightReceiver& receiver, const Weights& weights, std::size_t slot);
+    // The light of a slot; `left` in [0, 1) chooses among those of its node.
+    LightPick pick_in_slot(const LightReceiver& receiver, std::size_t slot, float left) const;
 
     const std::vector<WorldLight>& lights_;
     const LinkTable& links_;
     std::vector<Node> nodes_;
-    std::vector<int> roots_, cut_;    // of nodes_
-    std::vector<int> slot_of_node_;   // in the cut; -1
-    std::vector<int> leaf_of_light_;  // -1 where the picker lacks the light
-    std::vector<Infinite> infinite_;  // slots after the cut's
-    std::vector<int> infinite_of_light_;
+    std::vector<int> roots_, cut_;        // of nodes_
+    std::vector<int> slot_of_node_;       // in the cut; -1
+    std::vector<int> leaf_of_light_;      // -1 where the picker lacks the light
+    std::vector<Infinite> infinite_;      // slots after the cut's
+    std::vector<int> infinite_of_light_;  // index, -1
 };
 
 }  // namespace frazil

@@ -74,9 +74,27 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
 }
 
 LightPick LightSampler::pick(const LightReceiver& receiver, float u, LightUse use) const {
+    LightReceiver alone = receiver;
+    alone.picks = 1.0f;
+    const std::vector<LightPick>& picks = pick_all(alone, u, use);
+    return picks.empty() ? LightPick() : picks.front();
+}
+
+const std::vector<LightPick>& LightSampler::pick_all(const LightReceiver& receiver, float u, LightUse use) const {
     thread_local GroupPicker::Weights weights;
+    thread_local std::vector<LightPick> picks;
     picker(use).weigh(receiver, weights);
-    return picker(use).pick(receiver, weights, u);
+    picker(use).pick(receiver, weights, u, picks);
+    return picks;
+}
+
+void LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, std::vector<LightSample>& samples,
+                          LightUse use) const {
+    samples.clear();
+    for (const LightPick& picked : pick_all(receiver, u_pick, use)) {
+        samples.push_back(sample_one(picked.light, receiver.position, u));
+        samples.back().pdf *= picked.probability;
+    }
 }
 
 LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, const V2f& u, LightUse use) const {

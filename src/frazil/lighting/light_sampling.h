@@ -1,6 +1,6 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: one light picked per sample: its group evenly (group_picker.h), in it by the irradiance that a light can give
-//   (light_picker.h), then a direction on it (world_light.h).
+// Model: as many lights per receiver as it asks for: their groups evenly (group_picker.h), in these by the irradiance that
+//   a light can give (light_picker.h), then a direction on each (world_light.h).
 // Units: pdf per steradian, the pick included.
 // Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose multipliers of the
 //   wanted use are 0, or that is not linked to the receiver's object, is never picked.
@@ -34,7 +34,11 @@ class LightSampler {
 
     // One light for the receiver, without a direction.
     LightPick pick(const LightReceiver& receiver, float u, LightUse use = LightUse::surface) const;
-    // One direction for the receiver; `u_pick` chooses the light, `u` the direction.
+    // A direction to each of the lights that the receiver asks for; `u_pick` chooses them, `u` serves all. Their pdfs are
+    // densities of the expected number of samples.
+    void sample(const LightReceiver& receiver, float u_pick, const V2f& u, std::vector<LightSample>& samples,
+                LightUse use = LightUse::surface) const;
+    // One direction for the receiver.
     LightSample sample(const LightReceiver& receiver, float u_pick, const V2f& u,
                        LightUse use = LightUse::surface) const;
     LightSample sample(const V3f& position, float u_pick, const V2f& u) const {
@@ -92,6 +96,8 @@ class LightSampler {
         std::unique_ptr<const LightPicker> all;  // whatever the multipliers: for rays that run into lights
     };
     const World& world() const { return *world_; }
+    // Until the thread's next call.
+    const std::vector<LightPick>& pick_all(const LightReceiver& receiver, float u, LightUse use) const;
     const GroupPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
 
     std::vector<Light> lights_;

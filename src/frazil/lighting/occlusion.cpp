@@ -1,6 +1,7 @@
 #include "frazil/lighting/occlusion.h"
 
 #include <algorithm>
+#include <array>
 
 #include "frazil/base/error.h"
 #include "frazil/base/morton.h"
@@ -23,6 +24,66 @@ void check(const PointSet& points, float distance) {
     if (!(distance > 0.0f)) throw ValueError(str("occlusion: distance must be > 0, got ", distance, "."));
 }
 
+// The hemisphere over a point as a raster of its cosine-weighted measure: a disk of equal cells [Christensen2008].
+class Raster {
+  public:
+    static constexpr int kSize = 16;
+
+    Raster() {
+        for (int y = 0; y < kSize; ++y) {
+            for (int x = 0; x < kSize; ++x) {
+                const float u = (2.0f * float(x) + 1.0f) / kSize - 1.0f, v = (2.0f * float(y) + 1.0f) / kSize - 1.0f;
+                const float rest = 1.0f - u * u - v * v;
+                cell_at_[std::size_t(y * kSize + x)] = rest > 0.0f ? int(directions_.size()) : -1;
+                if (rest > 0.0f) directions_.emplace_back(u, v, std::sqrt(rest));
+            }
+        }
+    }
+
+    std::size_t size() const { return directions_.size(); }
+    const std::vector<V3f>& directions() const { return directions_; }  // local, the normal is z
+
+    // The solid angle of a cell in a direction of this cosine.
+    static float solid_angle(float cosine) { return (2.0f / kSize) * (2.0f / kSize) / std::max(cosine, 1.0f / kSize); }
+    // Hide a part of a cell's size about a direction: shared out to the four cells whose middles are nearest.
+    void hide_part(const V3f& direction, float part, std::vector<float>& hidden) const {
+        const float x = (direction.x + 1.0f) * (0.5f * kSize) - 0.5f, y = (direction.y + 1.0f) * (0.5f * kSize) - 0.5f;
+        const int left = int(std::floor(x)), low = int(std::floor(y));
+        for (int k = 0; k < 4; ++k) {
+            const int column = left + (k & 1), row = low + (k >> 1);
+            if (column < 0 || row < 0 || column >= kSize || row >= kSize) continue;
+            const int cell = cell_at_[std::size_t(row * kSize + column)];
+            if (cell < 0) continue;
+            const float share = (1.0f - std::abs(x - float(column))) * (1.0f - std::abs(y - float(row)));
+            float& value = hidden[std::size_t(cell)];
+            value = std::min(1.0f, value + share * part);
+        }
+    }
+    // Hide what a disk hides: its middle, unit normal and radius.
+    void hide_disk(const V3f& to, const V3f& normal, float radius, std::vector<float>& hidden) const {
+        const float distance = to.length(), plane = to.dot(normal);
+        // Directions to it differ from that to its middle by no more than this.
+        const float reach = std::min(1.0f, distance > radius ? 1.5f * radius / distance : 1.0f) + 1.0f / kSize;
+        const V2f center(to.x / distance, to.y / distance);
+        const auto bound = [](float x) { return std::clamp(int((x + 1.0f) * (0.5f * kSize)), 0, kSize - 1); };
+        for (int y = bound(center.y - reach); y <= bound(center.y + reach); ++y) {
+            for (int x = bound(center.x - reach); x <= bound(center.x + reach); ++x) {
+                const int cell = cell_at_[std::size_t(y * kSize + x)];
+                if (cell < 0 || hidden[std::size_t(cell)] >= 1.0f) continue;
+                const V3f& direction = directions_[std::size_t(cell)];
+                const float slope = direction.dot(normal);
+                if (slope == 0.0f) continue;
+                const float t = plane / slope;
+                if (t > 0.0f && (direction * t - to).length2() <= radius * radius) hidden[std::size_t(cell)] = 1.0f;
+            }
+        }
+    }
+
+  private:
+    std::vector<V3f> directions_;
+    std::array<int, std::size_t(kSize) * kSize> cell_at_{};
+};
+
 // Disks by position: a binary tree over the Morton order, its nodes in pre-order.
 class DiskTree {
   public:
@@ -39,69 +100,52 @@ class DiskTree {
 
     const std::vector<std::uint32_t>& order() const { return order_; }
 
-    // Sum area and normals, weighed by what each point counts.
-    void weigh(const std::vector<float>& weights) {
-        for (std::size_t i = nodes_.size(); i-- > 0;) {
-            Node& node = nodes_[i];
-            node.area = 0.0f;
-            node.flow = V3f(0.0f);
-            const auto add = [&](float area, const V3f& flow) { node.area += area, node.flow += flow; };
-            if (node.right == 0) {
-                for (std::size_t k = node.begin; k < node.end; ++k) {
-                    const float area = points_.areas[order_[k]] * weights[order_[k]];
-                    add(area, points_.normals[order_[k]] * area);
-                }
-            } else {
-                for (const std::size_t child : {i + 1, std::size_t(node.right)}) {
-                    add(nodes_[child].area, nodes_[child].flow);
-                }
-            }
-        }
-    }
-
-    // What hides the sky from a point: the sum over disks of their share of the hemisphere by cosine, and of the
-    // directions that they hide.
-    void gather(std::uint32_t point, float distance, float tolerance, const std::vector<float>& weights, float& hidden,
-                V3f& hidden_flow) const {
+    // What hides each cell of a point's raster, 0 to 1. A cluster that is seen under less than `tolerance` counts as one
+    // disk that faces the point.
+    void gather(std::uint32_t point, float distance, float tolerance, const Raster& raster,
+                std::vector<float>& hidden) const {
+        hidden.assign(raster.size(), 0.0f);
         const V3f& position = points_.positions[point];
         const V3f& normal = points_.normals[point];
-        hidden = 0.0f;
-        hidden_flow = V3f(0.0f);
-        const auto add = [&](const V3f& to, float area, const V3f& flow) {
-            const float d2 = to.length2(), d = std::sqrt(d2);
-            if (d2 == 0.0f || d > distance) return;
-            const V3f direction = to / d;
-            const float receiving = normal.dot(direction);
-            if (receiving <= 0.0f) return;
-            // Either side of a disk hides; a disk's own share stays below the hemisphere's when it is near.
-            const float facing = std::abs(flow.dot(direction)), share = receiving * facing / (kPi * d2 + area);
-            hidden += share;
-            hidden_flow += direction * share;
-        };
+        const auto [s, t] = tangent_frame(normal);
+        const V3f side = s, other_side = t;
+        const auto to_local = [&](const V3f& v) { return V3f(v.dot(side), v.dot(other_side), v.dot(normal)); };
         std::size_t i = 0;
         while (i < nodes_.size()) {
             const Node& node = nodes_[i];
             const V3f to = node.center - position;
-            const float d2 = to.length2();
-            const bool is_beyond = std::sqrt(d2) > distance + node.radius;
-            // Below the horizon as a whole.
-            const bool is_below = to.dot(normal) < -node.radius;
-            if (is_beyond || is_below) {
+            const float d2 = to.length2(), d = std::sqrt(d2);
+            if (d > distance + node.radius || to.dot(normal) < -node.radius) {
                 i = node.skip;
-            } else if (d2 > 4.0f * node.radius * node.radius && node.area < tolerance * d2) {
-                add(to, node.area, node.flow);
+                continue;
+            }
+            if (d > 2.0f * node.radius && node.area < tolerance * d2 && d <= distance) {
+                // A cluster that the horizon cuts counts in part.
+                const float above = std::clamp(0.5f + 0.5f * to.dot(normal) / node.radius, 0.0f, 1.0f);
+                hide_cluster(to_local(to), above * seen_area(node, to / d), raster, hidden);
                 i = node.skip;
-            } else if (node.right == 0) {
+                continue;
+            }
+            if (node.right == 0) {
                 for (std::size_t k = node.begin; k < node.end; ++k) {
                     const std::uint32_t other = order_[k];
-                    if (other == point) continue;
-                    const float area = points_.areas[other] * weights[other];
-                    add(points_.positions[other] - position, area, points_.normals[other] * area);
+                    const V3f to_other = points_.positions[other] - position;
+                    if (other == point || to_other.length2() > distance * distance) continue;
+                    const float area = points_.areas[other];
+                    const float radius = std::sqrt(area * kInvPi);
+                    const V3f local = to_local(to_other);
+                    if (local.z + radius <= 0.0f || local.length2() == 0.0f) continue;
+                    const V3f facing = to_local(points_.normals[other]);
+                    if (area > Raster::solid_angle(local.z / local.length()) * local.length2()) {
+                        raster.hide_disk(local, facing, radius, hidden);
+                    } else if (local.z > 0.0f) {
+                        hide_cluster(local, area * std::abs(facing.dot(local)) / local.length(), raster, hidden);
+                    }
                 }
                 i = node.skip;
-            } else {
-                ++i;
+                continue;
             }
+            ++i;
         }
     }
 
@@ -112,11 +156,34 @@ class DiskTree {
         V3f flow = V3f(0.0f);  // sum of area times normal
         std::size_t begin = 0, end = 0, right = 0, skip = 0;
     };
+
+    // What a cluster hides in a direction: what looks one way by its cosine, the rest as a convex body, a quarter.
+    static float seen_area(const Node& node, const V3f& direction) {
+        return std::abs(node.flow.dot(direction)) + 0.25f * std::max(0.0f, node.area - node.flow.length());
+    }
+
+    static void hide_cluster(const V3f& to, float area, const Raster& raster, std::vector<float>& hidden) {
+        const float d2 = to.length2();
+        if (!(to.z > 0.0f)) return;
+        const V3f direction = to / std::sqrt(d2);
+        const float cell = Raster::solid_angle(direction.z);
+        if (area > cell * d2) {
+            raster.hide_disk(to, direction, std::sqrt(area * kInvPi), hidden);
+        } else {
+            raster.hide_part(direction, area / (cell * d2), hidden);
+        }
+    }
+
     void build(std::size_t begin, std::size_t end) {
         const std::size_t index = nodes_.size();
         nodes_.emplace_back();
         Box3f box;
-        for (std::size_t k = begin; k < end; ++k) box.extendBy(points_.positions[order_[k]]);
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::uint32_t point = order_[k];
+            box.extendBy(points_.positions[point]);
+            nodes_[index].area += points_.areas[point];
+            nodes_[index].flow += points_.normals[point] * points_.areas[point];
+        }
         nodes_[index].center = (box.min + box.max) * 0.5f;
         nodes_[index].radius = 0.5f * (box.max - box.min).length();
         nodes_[index].begin = begin, nodes_[index].end = end;
@@ -180,25 +247,25 @@ Occlusion point_occlusion(const PointSet& points, float distance, float toleranc
     }
     if (!(tolerance > 0.0f)) throw ValueError(str("occlusion: tolerance must be > 0, got ", tolerance, "."));
     Occlusion result{std::vector<float>(points.size(), 1.0f), points.normals};
-    DiskTree tree(points);
-    std::vector<float> weights(points.size(), 1.0f);
-    // The first pass counts all disks; in the second those that are hidden themselves hide less.
-    for (int pass = 0; pass < 2; ++pass) {
-        tree.weigh(weights);
-        parallel_for(points.size(), kPointsPerChunk, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) {
-                const std::uint32_t i = tree.order()[k];
-                float hidden;
-                V3f hidden_flow;
-                tree.gather(i, distance, tolerance, weights, hidden, hidden_flow);
-                result.openness[i] = std::max(0.0f, 1.0f - hidden);
-                // The mean direction of a whole hemisphere by cosine is 2/3 of the normal.
-                const V3f open = points.normals[i] * (2.0f / 3.0f) - hidden_flow;
-                result.bent_normals[i] = open.length2() > 1e-8f ? open.normalized() : points.normals[i];
+    const DiskTree tree(points);
+    const Raster raster;
+    parallel_for(points.size(), kPointsPerChunk, [&](std::size_t begin, std::size_t end) {
+        std::vector<float> hidden;
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::uint32_t i = tree.order()[k];
+            tree.gather(i, distance, tolerance, raster, hidden);
+            float open = 0.0f;
+            V3f mean(0.0f);
+            for (std::size_t cell = 0; cell < raster.size(); ++cell) {
+                open += 1.0f - hidden[cell];
+                mean += raster.directions()[cell] * (1.0f - hidden[cell]);
             }
-        });
-        weights = result.openness;
-    }
+            result.openness[i] = open / float(raster.size());
+            const auto [s, t] = tangent_frame(points.normals[i]);
+            const V3f bent = s * mean.x + t * mean.y + points.normals[i] * mean.z;
+            if (bent.length2() > 1e-8f) result.bent_normals[i] = bent.normalized();
+        }
+    });
     return result;
 }
 

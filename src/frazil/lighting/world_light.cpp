@@ -6,6 +6,9 @@ namespace frazil {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+// What is left of a dome for the choice at a surface, whose own lobes find the rest of it.
+constexpr float kDomeShare = 0.5f;
+constexpr float kLeastOfDome = 0.05f;  // of a dome's mean, what the choice takes its light at the least for
 
 V3f row(const M44f& m, int i) {
     return {m[i][0], m[i][1], m[i][2]};
@@ -158,9 +161,8 @@ WorldLight::WorldLight(const Light& light) {
         bounds_.even = bounds_.power;
     }
     if (const Dome* dome = std::get_if<Dome>(&shape_); dome && dome->image) {
-        brightness_ = absolute(radiance_ * dome->image->average());
-        // An image whose pixels cancel must still be found.
-        brightness_ = std::max(brightness_, 1e-3f * absolute(radiance_));
+        // A black image is found too, as a hit on it says so.
+        brightness_ *= std::max(dome->image->brightness(), 1e-3f);
     }
 }
 
@@ -214,9 +216,21 @@ void WorldLight::dome_radiances(std::span<const V3f> directions, std::span<float
     }
 }
 
-float WorldLight::importance(const V3f& position) const {
-    if (is_dome()) return kPi * brightness_;
-    if (const Distant* distant = std::get_if<Distant>(&shape_)) return distant->size * brightness_;
+float WorldLight::importance(const V3f& position, const V3f& normal) const {
+    const bool is_facing = normal != V3f(0.0f);
+    if (const Dome* dome = std::get_if<Dome>(&shape_)) {
+        if (!is_facing) return kPi * brightness_;
+        if (!dome->image) return kDomeShare * kPi * brightness_;
+        const V3f local(normal.dot(dome->x), normal.dot(dome->y), normal.dot(dome->z));
+        return kDomeShare * brightness_ * std::max(kPi * kLeastOfDome, dome->image->irradiance(local));
+    }
+    if (const Distant* distant = std::get_if<Distant>(&shape_)) {
+        // The cosine at the part of the cone that stands highest.
+        const float cosine = is_facing ? cos_difference(normal.dot(distant->axis), 1.0f - distant->cap) : 1.0f;
+        return distant->size * brightness_ * std::max(0.0f, cosine);
+    }
+    const float receiving = receiving_cosine(bounds_.box, position, normal);
+    if (receiving == 0.0f) return 0.0f;
     const V3f to_light = extent_.center - position;
     const float distance = to_light.length(), radius = extent_.radius;
     float facing = 1.0f;
@@ -232,7 +246,7 @@ float WorldLight::importance(const V3f& position) const {
         if (frazil::importance(bounds_, position, V3f(0.0f)) == 0.0f) return 0.0f;
         facing *= std::max(luminance(shaped(to_light / distance)), 0.02f);
     }
-    return brightness_ * (extent_.projected_area / d) * (facing / d);
+    return receiving * brightness_ * (extent_.projected_area / d) * (facing / d);
 }
 
 }  // namespace frazil

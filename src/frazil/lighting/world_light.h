@@ -51,8 +51,9 @@ class WorldLight {
     // The same for a ray that has met a triangle of a mesh light's object at distance t.
     bool hit_triangle(std::uint32_t triangle, const V3f& direction, float t, LightHit& hit) const;
 
-    // An estimate of the absolute irradiance at a point, for the choice among lights; 0 only where no light arrives.
-    float importance(const V3f& position) const;
+    // An estimate of the absolute irradiance at a point without occlusion, for the choice among lights; 0 only where no
+    // light arrives. A normal of zero receives from all sides alike.
+    float importance(const V3f& position, const V3f& normal) const;
     // Where it is and where to it shines; only where is_finite().
     const LightBounds& bounds() const { return bounds_; }
     bool is_finite() const { return !is_dome() && !std::holds_alternative<Distant>(shape_); }

@@ -49,6 +49,7 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     uv_ = utility("uv"), local_position_ = utility("Pref"), material_id_ = utility("material_id");
     instance_id_ = utility("instance_id"), point_spacing_ = utility("point_spacing");
     lacking_ = utility("compensation_factor"), motion_ = utility("motion");
+    occlusion_ = utility("occlusion"), bent_normal_ = utility("bent_normal");
     const std::size_t count = std::size_t(width) * height;
     id_slots_.assign(layout.ids.size(), std::vector<float>(count * kIdSlots * 2, 0.0f));
     std::fill(depth_, depth_ + count, std::numeric_limits<float>::infinity());
@@ -130,6 +131,8 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
         motion_[2 * film_pixel] = motion.x, motion_[2 * film_pixel + 1] = motion.y;
     }
     if (lacking_) increase(lacking_, film_pixel, tile.lacking(tile_pixel));
+    if (occlusion_) occlusion_[film_pixel] += tile.openness(tile_pixel);
+    if (bent_normal_) increase(bent_normal_, film_pixel, tile.open_directions(tile_pixel));
     for (std::size_t i = 0; i < lpes_.size(); ++i) increase(lpes_[i], film_pixel, tile.lpe(tile_pixel, i));
     for (std::size_t i = 0; i < mattes_.size(); ++i) {
         mattes_[i][film_pixel] += tile.matte(tile_pixel, i, false);
@@ -222,6 +225,11 @@ Film FilmSums::finish() {
             scale(albedo_, i, factor);
             scale(coverage_, i, factor);
             if (lacking_) scale(lacking_, i, factor);
+            if (occlusion_) occlusion_[i] *= hits > 0.0f ? 1.0f / hits : 0.0f;
+            if (bent_normal_) {
+                float* bent = bent_normal_ + 3 * i;
+                set(bent_normal_, i, V3f(bent[0], bent[1], bent[2]).normalized());
+            }
             float* pixel = beauty_ + 4 * i;
             pixel[0] = beauty.x, pixel[1] = beauty.y, pixel[2] = beauty.z, pixel[3] = hits * factor;
             sample_count_[i] = samples_[i];

@@ -60,8 +60,8 @@ class FilmSums {
     std::vector<GroupedLayer> components_, planes_;
     std::vector<float*> lpes_, mattes_, refracted_mattes_;
     std::vector<std::vector<float>> id_slots_;  // by Cryptomatte: (pixels, kIdSlots, 2)
-    float *uv_, *local_position_, *material_id_, *instance_id_, *point_spacing_, *lacking_,
-        *motion_;  // null where not asked for
+    float *uv_, *local_position_, *material_id_, *instance_id_, *point_spacing_, *lacking_, *motion_, *occlusion_,
+        *bent_normal_;  // null where not asked for
     float *beauty_, *depth_, *object_id_, *normal_, *position_, *coverage_, *albedo_, *sample_count_, *variance_;
     std::vector<float> samples_;  // per pixel; exact up to 2^24
     std::vector<float> subsets_;  // (pixels, kSampleSubsets): sums of the beauty's luminance

@@ -88,6 +88,12 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
             tile.add_primary(path.pixel,
                              {depth, surface.position, surface.normal, albedo, surface.object + 1, surface.st,
                               surface.local_position, motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
+            if (tile.keeps_places) {
+                Sampler own = path.sampler;
+                own.set_dimension(kOpennessDimensions);
+                tile.places.push_back(
+                    {path.pixel, surface.object, surface.position, surface.geometric_normal, own.next_2d()});
+            }
             tile.add_object(path.pixel, surface.object, false);
             if (!layout_.mattes.empty()) {
                 for (const std::uint32_t matte : layout_.mattes_of_object[surface.object]) {
@@ -197,8 +203,9 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     if (!(value.pdf > 0.0f)) return false;
     value.scale(Rgb(1.0f / (value.pdf * odds)));
     path.add_blur(luminance(value.diffuse) > luminance(value.specular) ? kDiffuseBlur : shader.alpha());
+    const float picks = path.light_picks();
     path.scatter(value, surface.object);
-    path.receive(surface, surface.horizon, LightUse::surface);
+    path.receive(surface, surface.horizon, LightUse::surface, picks);
     ++path.scattered;
     path.is_delta = false;
     path.has_direct_light = path.sees_lamps = true;

@@ -56,6 +56,8 @@ class PathTracer {
     void add_lights_on_ray(const Path& path, const Hit* surface, Tile& tile) const;
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
+    void add_light_sample(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
+                          const LightSample& sample, Tile& tile) const;
     Rgb visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
                    bool& is_straight) const;
     void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,

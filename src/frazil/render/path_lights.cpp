@@ -84,9 +84,15 @@ void PathTracer::add_lights_on_ray(const Path& path, const Hit* surface, Tile& t
 void PathTracer::add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                                   Sampler& sampler, Tile& tile) const {
     if (lights_.is_empty()) return;
+    thread_local std::vector<LightSample> samples;
     const float u_pick = sampler.next_1d();
-    const LightReceiver receiver{surface.position, surface.horizon, surface.object};
-    const LightSample sample = lights_.sample(receiver, u_pick, sampler.next_2d());
+    const LightReceiver receiver{surface.position, surface.horizon, surface.object, path.light_picks()};
+    lights_.sample(receiver, u_pick, sampler.next_2d(), samples);
+    for (const LightSample& sample : samples) add_light_sample(path, surface, shader, wo, sample, tile);
+}
+
+void PathTracer::add_light_sample(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
+                                  const LightSample& sample, Tile& tile) const {
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
@@ -105,7 +111,9 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     // Through a boundary broad lobes take light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight && shader.is_glossy()) specular_lobe = Rgb(0.0f);
 
-    const float mis = sample.is_delta || !is_straight ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
+    // Where the path ends here no lobe finds the light.
+    const bool is_alone = sample.is_delta || !is_straight || path.scattered >= max_bounces_;
+    const float mis = is_alone ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
     const Rgb light_over_pdf = sample.radiance * visible * (mis / sample.pdf);
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
     Scattering weights{diffuse_lobe, specular_lobe, Rgb(0.0f), 0.0f};

@@ -19,16 +19,19 @@
 namespace frazil {
 
 // Dimensions that one vertex may draw from the sampler, so that all vertices are stratified alike; a path that was split
-// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through, and of the
-// light that enters where ice is seen.
+// off has vertices of its own. Beyond them are those of surfaces and fracture planes that let a path through, of the
+// light that enters where ice is seen, and of what is open there.
 constexpr std::uint32_t kDimensionsPerVertex = 16;
 constexpr std::uint32_t kSplitVertex = 64;
-constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768;
+constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768,
+                        kOpennessDimensions = 49152;
 // Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
 // for what is left.
 constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
 // How much wider an opaque surface makes the cone that a path stands for, per metre.
 constexpr float kScatteredSpread = 0.05f;
+// Lights that are asked at a first vertex, about: one that gives a third of the light or more is asked every time.
+constexpr float kFirstPicks = 3.0f;
 
 // What a diffuse lobe counts for in Path::blur.
 constexpr float kDiffuseBlur = 0.3f;
@@ -143,9 +146,11 @@ struct Path {
         has_direct_light = false;
     }
 
+    // How many lights are asked at the vertex that it has come to.
+    float light_picks() const { return bounce == 0 ? kFirstPicks : 1.0f; }
     // `side` is that of the surface which receives.
-    void receive(const Surface& surface, const V3f& side, LightUse wanted) {
-        receiver = {surface.position, side, surface.object};
+    void receive(const Surface& surface, const V3f& side, LightUse wanted, float picks = 1.0f) {
+        receiver = {surface.position, side, surface.object, picks};
         use = wanted;
         has_passed = false;
     }

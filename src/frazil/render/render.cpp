@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
 
 #include "frazil/base/error.h"
@@ -12,6 +13,7 @@
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
 #include "frazil/render/motion.h"
+#include "frazil/render/openness.h"
 #include "frazil/render/overlay_layers.h"
 #include "frazil/render/path.h"
 #include "frazil/render/stopwatch.h"
@@ -211,9 +213,14 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);
+    std::optional<Openness> openness;
     const auto plant = [&](const std::vector<LitPoints>& lit) {
         plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
         if (layout.has("overlay")) plant_overlay_trees(SurfaceResolver(scene), lit, groups.size(), bodies);
+        if (layout.has("occlusion") || layout.has("bent_normal")) {
+            Stopwatch watch(stats.seconds["occlusion"]);
+            openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
+        }
     };
     if (baked) {
         check_bake(scene, *baked);
@@ -248,7 +255,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             parallel_for(open.size(), 1, [&](std::size_t i, std::size_t) {
                 Tile tile(kTileSize * kTileSize, layout.groups.size(), layout.plane_count(), layout.lpes.size(),
                           layout.mattes.size());
+                tile.keeps_places = openness.has_value();
                 render_tile(scene, options, tracer, gathering, view_axis, filter, canvas, open[i], tile);
+                if (openness) openness->answer(tile);
                 if (is_breaking_off()) return;
                 canvas.add(tile, open[i]);
                 camera_rays += tile.camera_rays;

@@ -66,6 +66,13 @@ struct GatherRequest {
     std::vector<Overlay> overlays;
 };
 
+// Where a sample's path first meets a surface, for the layers of its openness; `u` chooses a direction.
+struct SeenPlace {
+    std::uint32_t pixel = 0, object = 0;
+    V3f position = V3f(0.0f), normal = V3f(0.0f);
+    V2f u = V2f(0.0f);
+};
+
 class Tile {
   public:
     // `planes` of translucency, `lpes`, light path expressions, and `mattes` beside the components: see FilmLayout.
@@ -85,6 +92,8 @@ class Tile {
           lacking_(pixels, Rgb(0.0f)),
           hits_(pixels),
           nearest_(pixels),
+          openness_(pixels, 0.0f),
+          open_directions_(pixels, V3f(0.0f)),
           objects_(2 * pixels) {}
 
     void add(std::size_t pixel, Component component, std::size_t group, const Rgb& radiance) {
@@ -131,6 +140,12 @@ class Tile {
         lacking_[pixel] += lacking;
     }
 
+    // The share of the hemisphere that is open, and the mean of the open directions times it.
+    void add_openness(std::size_t pixel, float openness, const V3f& directions) {
+        openness_[pixel] += openness;
+        open_directions_[pixel] += directions;
+    }
+
     const Rgb& light(std::size_t pixel, std::size_t component, std::size_t group) const {
         return light_[(pixel * kComponentCount + component) * groups_ + group];
     }
@@ -152,10 +167,14 @@ class Tile {
     const IdCounts& objects(std::size_t pixel, bool seen_through) const {
         return objects_[seen_through ? hits_.size() + pixel : pixel];
     }
+    float openness(std::size_t pixel) const { return openness_[pixel]; }
+    const V3f& open_directions(std::size_t pixel) const { return open_directions_[pixel]; }
     std::uint32_t hits(std::size_t pixel) const { return hits_[pixel]; }
     const PrimaryHit& nearest(std::size_t pixel) const { return nearest_[pixel]; }
 
     std::vector<GatherRequest> requests;
+    std::vector<SeenPlace> places;
+    bool keeps_places = false;
     int subset = 0;  // of the sample that is traced or gathered now
     std::uint64_t camera_rays = 0, rays = 0, gathers = 0, dropped_samples = 0;
 
@@ -169,6 +188,8 @@ class Tile {
     std::vector<Rgb> coverage_, lacking_;
     std::vector<std::uint32_t> hits_;
     std::vector<PrimaryHit> nearest_;
+    std::vector<float> openness_;
+    std::vector<V3f> open_directions_;
     std::vector<IdCounts> objects_;  // per pixel, seen directly; then once more, seen through ice
 };
 

@@ -1,0 +1,31 @@
+// The layers `occlusion` and `bent_normal`: how much of the hemisphere is open where the camera looks first, and whereto.
+// Model: on ice, baked by rays at its points and gathered from there with a kernel as wide as their spacing, without
+//   noise; on other surfaces one ray a sample, drawn by the cosine (lighting/occlusion.h).
+// Units: openness 0 (all hidden) to 1; world space.
+// Valid: thread-safe after construction, a tile a thread. Whatever the distance, every surface hides.
+// Not: sheets of ice thinner than the spacing of their points: both sides share what they see.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "frazil/geometry/ray_scene.h"
+#include "frazil/render/bodies.h"
+#include "frazil/render/tile.h"
+
+namespace frazil {
+
+class Openness {
+  public:
+    // `lit` are the points of each body; `samples` rays are traced at each. The scene must outlive this.
+    Openness(const std::vector<LitPoints>& lit, const RayScene& scene, int samples, std::uint32_t seed);
+
+    // Answer what the tile's samples have seen first, and forget it.
+    void answer(Tile& tile) const;
+
+  private:
+    const RayScene& scene_;
+    std::vector<std::unique_ptr<const PointTree>> trees_;  // by object; null for other surfaces
+};
+
+}  // namespace frazil
