@@ -22,7 +22,7 @@ def translucency(mesh: fz.Mesh, spacing: float, estimator: str, bake_samples: in
     scene.add_object("/body", scene.add_mesh(mesh, "/body"), ice)
     matrix = np.eye(4)
     matrix[:3, :3] = np.linalg.qr(np.array([[0.3, 0.8, 0.5], [1, 0, 0], [0, 1, 0]]).T)[0][:, [1, 2, 0]].T
-    scene.add_light(fz.Light(fz.DistantLight(), radiance=[3.0, 2.7, 2.2], matrix=matrix, path="/sun"))
+    scene.add_light(fz.Light(fz.DistantLight(0.0), radiance=[3.0, 2.7, 2.2], matrix=matrix, path="/sun"))
     scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.1, 0.1, 0.1], path="/sky"))
     film = fz.render(
         scene, resolution=(64, 64), samples=16, spacing=spacing, estimator=estimator, bake_bounces=0,
