@@ -83,7 +83,7 @@ def scene(frame=None, camera="/World/Camera", resolution=None, file="scene.usda"
     )
 
 
-def load_usd(path, frame=None, camera=None, rest_frame=None):
+def load_usd(path, frame=None, camera=None, rest_frame=None, materials=None, look=None):
     return scene(frame, camera or "/World/Camera", file=path)
 
 

@@ -124,7 +124,7 @@ def test_chosen_layers_only(capsys, core, scene, tmp_path):
 
 
 def test_the_resolution_of_the_stage_is_the_default(capsys, core, scene, tmp_path, monkeypatch):
-    def load_usd(path, frame=None, camera=None, rest_frame=None):
+    def load_usd(path, frame=None, camera=None, rest_frame=None, materials=None, look=None):
         return fake_core.scene(resolution=(30, 20))
 
     monkeypatch.setattr(fz.usd, "load_usd", load_usd)
@@ -227,7 +227,7 @@ def test_what_the_core_refuses_is_one_line_and_status_1(capsys, core, scene, tmp
 def test_warnings_are_single_lines_told_once(capsys, core, scene, tmp_path, monkeypatch):
     import warnings
 
-    def load_usd(path, frame=None, camera=None, rest_frame=None):
+    def load_usd(path, frame=None, camera=None, rest_frame=None, materials=None, look=None):
         warnings.warn("/World/Cloth: NurbsPatch is not supported.\nLeft out.", fz.FrazilWarning, stacklevel=2)
         warnings.warn("something in a library", DeprecationWarning, stacklevel=2)
         return fake_core.scene(frame)

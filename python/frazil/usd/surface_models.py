@@ -354,7 +354,7 @@ class SurfaceModelReader:
         forward = float(np.clip(self._number("subsurface_anisotropy"), -0.95, 0.95))
         radius = np.resize(self._mean("subsurface_radius"), 3) * self._number("subsurface_scale") * unit
         radius = np.maximum(radius / (1.0 - forward), find_input(ICE_INPUTS, "mean_free_path").minimum)
-        return Medium.from_albedo(mean.tolist(), radius.tolist(), eta), tint
+        return Medium.from_albedo(mean.tolist(), radius.tolist(), eta, find_input(ICE_INPUTS, "profile").default), tint
 
 
 def _mean_of(value: Expression) -> np.ndarray:

@@ -107,10 +107,11 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const PointSet& points) {
+std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const LitPoints& lit) {
+    if (lit.cells || lit.moments.empty()) return lit.cells;
     const Object& placed = scene.objects[object];
     return std::make_shared<const Cells>(
-        cells_of(points, transformed(scene.meshes[placed.mesh], placed.local_to_world)));
+        cells_of(lit.points, transformed(scene.meshes[placed.mesh], placed.local_to_world)));
 }
 
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
@@ -128,12 +129,10 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             continue;
         }
         const PointSet& points = sets.points(i);
-        const auto cells_of_object = [&](std::size_t k) {
-            return lit[k].cells || lit[k].moments.empty() ? lit[k].cells : cells_of_body(scene, k, lit[k].points);
-        };
-        const std::shared_ptr<const Cells> cells = sets.cells(i, cells_of_object);
+        const std::shared_ptr<const Cells> cells =
+            sets.cells(i, [&](std::size_t k) { return cells_of_body(scene, k, lit[k]); });
         std::vector<V3f> moments;
-        if (cells) {
+        if (cells && trees_take_moments(groups)) {
             moments = sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return lit[k].moments; });
         }
         bodies[i]->tree = std::make_shared<const PointTree>(

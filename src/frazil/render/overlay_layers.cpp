@@ -1,6 +1,7 @@
 #include "frazil/render/overlay_layers.h"
 
 #include <algorithm>
+#include <type_traits>
 
 namespace frazil {
 namespace {
@@ -35,23 +36,29 @@ Rgb change_of_core(const OverlayShare& overlay, const Rgb& share) {
     return overlay.core - over((Rgb(1.0f) - share) * overlay.clearness, share);
 }
 
-void plant_overlay_trees(const SurfaceResolver& resolver, const std::vector<LitPoints>& lit, std::size_t groups,
+void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
                          std::vector<std::unique_ptr<Body>>& bodies) {
+    const SurfaceResolver resolver(scene);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0 || bodies[i]->material->overlays.empty()) continue;
         const std::size_t overlays = bodies[i]->material->overlays.size(), count = lit[i].points.size();
         const std::vector<float> taken = resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points);
-        std::vector<Rgb> light(count * overlays * groups);
-        for (std::size_t n = 0; n < count; ++n) {
-            for (std::size_t k = 0; k < overlays; ++k) {
-                for (std::size_t g = 0; g < groups; ++g) {
-                    light[(n * overlays + k) * groups + g] =
-                        lit[i].irradiance[n * groups + g] * -taken[n * overlays + k];
+        // As much of the light, and of its moments, as each overlay takes.
+        const auto taken_of = [&](const auto& values) {
+            std::remove_cvref_t<decltype(values)> result(values.size() * overlays);
+            for (std::size_t n = 0; n < count && !values.empty(); ++n) {
+                for (std::size_t k = 0; k < overlays; ++k) {
+                    for (std::size_t g = 0; g < groups; ++g) {
+                        result[(n * overlays + k) * groups + g] = values[n * groups + g] * -taken[n * overlays + k];
+                    }
                 }
             }
-        }
-        bodies[i]->overlay_tree = std::make_unique<const PointTree>(lit[i].points, light, overlays * groups,
-                                                                    bodies[i]->profile, bodies[i]->material->ramp);
+            return result;
+        };
+        const std::shared_ptr<const Cells> cells = cells_of_body(scene, i, lit[i]);
+        bodies[i]->overlay_tree = std::make_unique<const PointTree>(
+            lit[i].points, taken_of(lit[i].irradiance), overlays * groups, bodies[i]->profile, bodies[i]->material->ramp,
+            cells.get(), cells && trees_take_moments(groups) ? taken_of(lit[i].moments) : std::vector<V3f>());
     }
 }
 

@@ -28,7 +28,7 @@ std::vector<OverlayShare> overlay_shares(const Surface& surface, const std::vect
 Rgb change_of_core(const OverlayShare& overlay, const Rgb& share);
 
 // Give every body with overlays a tree of the light that each of them takes from its points: (N, overlays * groups).
-void plant_overlay_trees(const SurfaceResolver& resolver, const std::vector<LitPoints>& lit, std::size_t groups,
+void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
                          std::vector<std::unique_ptr<Body>>& bodies);
 
 }  // namespace frazil

@@ -216,7 +216,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     std::optional<Openness> openness;
     const auto plant = [&](const std::vector<LitPoints>& lit) {
         plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
-        if (layout.has("overlay")) plant_overlay_trees(SurfaceResolver(scene), lit, groups.size(), bodies);
+        if (layout.has("overlay")) plant_overlay_trees(scene, lit, groups.size(), bodies);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
             openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
