@@ -1,6 +1,6 @@
 """White furnace: ice that absorbs nothing under even light of radiance 1 must look 1 everywhere.
 
-    python bench/furnace.py MESH.ply [--bounces 8] [--samples 64] [--spacing S]
+    python bench/furnace.py MESH.ply [--bounces 8] [--samples 64] [--spacing S] [--eta 1.31]
 
 Per compensation: least, mean and greatest radiance over the pixels that the body fills, and the share within 2 % of 1.
 """
@@ -14,12 +14,14 @@ import trimesh
 import frazil as fz
 
 
-def furnace(mesh: fz.Mesh, compensation: str, bounces: int, samples: int, spacing: float, size: int = 96) -> np.ndarray:
+def furnace(
+    mesh: fz.Mesh, compensation: str, bounces: int, samples: int, spacing: float, eta: float = 1.31, size: int = 96
+) -> np.ndarray:
     """Radiance, one channel, of the pixels that the body fills."""
     scene = fz.Scene()
     low, high = mesh.positions.min(0), mesh.positions.max(0)
     scale = float(np.linalg.norm(high - low))
-    medium = fz.Medium(30.0 / scale, 0.0, eta=1.31)
+    medium = fz.Medium(30.0 / scale, 0.0, eta=eta)
     ice = fz.IceMaterial(medium, compensation=compensation, roughness=0.3)
     scene.add_object("/body", scene.add_mesh(mesh, "/body"), scene.add_material("/ice", ice))
     scene.add_light(fz.Light(fz.DomeLight(), radiance=[1.0, 1.0, 1.0], path="/sky"))
@@ -37,13 +39,14 @@ def main() -> None:
     parser.add_argument("--bounces", type=int, default=8)
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--spacing", type=float, default=0.0)
+    parser.add_argument("--eta", type=float, default=1.31)
     options = parser.parse_args()
     shape = trimesh.load(options.mesh, force="mesh", process=False)
     mesh = fz.Mesh(np.asarray(shape.vertices), np.asarray(shape.faces))
     print("| compensation | least | mean | greatest | within 2 % |\n|---|---|---|---|---|")
     for mode in ("off", "ratio", "conserve", "depth"):
         bounces = options.bounces if mode in ("conserve", "depth") else 0  # others make energy with each
-        values = furnace(mesh, mode, bounces, options.samples, options.spacing)
+        values = furnace(mesh, mode, bounces, options.samples, options.spacing, options.eta)
         close = 100 * np.mean(np.abs(values - 1) <= 0.02)
         numbers = " | ".join(f"{v:.3f}" for v in (values.min(), values.mean(), values.max()))
         print(f"| {mode}, {bounces} bounces | {numbers} | {close:.1f} % |", flush=True)
