@@ -1,4 +1,4 @@
-"""Direct light against Mitsuba 3, pixel by pixel: a floor, a ball and a wall of one diffuse material under each kind of light.
+"""Direct light against Mitsuba 3, pixel by pixel: floor, ball and wall of one diffuse material, each light in turn.
 
     pip install mitsuba; python bench/direct_light.py [--samples N] [--out DIR]
 

@@ -55,7 +55,7 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
     scene.add_light(
         fz.Light(fz.RectLight(0.7, 0.7), matrix=rim, radiance=[34.0, 25.0, 15.0], path="/rim", **(off | multipliers))
     )
-    scene.camera = fz.Camera(matrix=look_at((0.3, 0.75, 2.6), (0.05, 0.47, 0)), focal_length=35.0)
+    scene.camera = fz.Camera(matrix=look_at((0.3, 0.75, 2.6), (0.06, 0.5, 0)), focal_length=52.0)
     return scene
 
 

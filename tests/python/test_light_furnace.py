@@ -1,4 +1,4 @@
-"""What all lights must keep together: a furnace of any mix is the same picture, twins cancel, occlusion is what is open."""
+"""What all lights keep together: a furnace of any mix is one picture, twins cancel, occlusion is what is open."""
 
 import numpy as np
 import pytest

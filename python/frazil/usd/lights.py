@@ -180,8 +180,8 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
 
 
 def _hinted_sizes(context: ReadContext, prim: Usd.Prim, kind: str, values: list[float]) -> list[float]:
-    # treatAsPoint and treatAsLine let a renderer that has no areas leave them out. Ours has: only lights whose radius is 0
-    # for that reason are given a small one, which with `normalize` is as strong.
+    # treatAsPoint and treatAsLine let a renderer that has no areas leave them out. Ours has: only lights of radius 0
+    # are given a small one for it, which with `normalize` is as strong.
     hint = {"SphereLight": "treatAsPoint", "CylinderLight": "treatAsLine"}.get(kind)
     if hint is None or not context.get(prim.GetAttribute(hint), False) or values[-1] != 0.0:
         return values
@@ -189,7 +189,7 @@ def _hinted_sizes(context: ReadContext, prim: Usd.Prim, kind: str, values: list[
     if not _get(context, prim, "normalize", False):
         context.warn(
             prim.GetPath(),
-            f"{hint} with radius 0 has no area to shine from: normalize should be on. A radius of {radius:g} is used.",
+            f"{hint} with radius 0 has no area to shine from: normalize should be on. Radius {radius:g} is used.",
         )
     return [*values[:-1], radius]
 
