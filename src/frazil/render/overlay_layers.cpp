@@ -57,8 +57,9 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
         };
         const std::shared_ptr<const Cells> cells = cells_of_body(scene, i, lit[i]);
         bodies[i]->overlay_tree = std::make_unique<const PointTree>(
-            lit[i].points, taken_of(lit[i].irradiance), overlays * groups, bodies[i]->profile, bodies[i]->material->ramp,
-            cells.get(), cells && trees_take_moments(groups) ? taken_of(lit[i].moments) : std::vector<V3f>());
+            lit[i].points, taken_of(lit[i].irradiance), overlays * groups, bodies[i]->profile,
+            bodies[i]->material->ramp, cells.get(),
+            cells && trees_take_moments(groups) ? taken_of(lit[i].moments) : std::vector<V3f>());
     }
 }
 
