@@ -129,8 +129,13 @@ def test_interrupt_stops_at_the_next_step(monkeypatch):
         time.sleep(0.02)
 
     fake_core.install(monkeypatch, fake_core.Core(steps=1000, on_step=on_step))
-    with pytest.raises(KeyboardInterrupt):
-        fz.render(fake_core.scene(), resolution=(4, 4))
+    # A shell starts what it puts into the background with this signal ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            fz.render(fake_core.scene(), resolution=(4, 4))
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert len(steps) < 50
     assert not any(thread.name == "frazil render" for thread in threading.enumerate())
 
