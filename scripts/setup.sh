@@ -8,7 +8,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 # Why each is needed: docs/architecture.md.
-readonly PACKAGES=(build-essential pkg-config libembree-dev libtbb-dev libhwy-dev libimath-dev doctest-dev)
+readonly PACKAGES=(build-essential pkg-config libembree-dev libtbb-dev libhwy-dev libimath-dev doctest-dev openexr)
 
 fail() {
     echo "setup: error: $*" >&2
