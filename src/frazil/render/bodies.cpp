@@ -132,7 +132,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         const std::shared_ptr<const Cells> cells =
             sets.cells(i, [&](std::size_t k) { return cells_of_body(scene, k, lit[k]); });
         std::vector<V3f> moments;
-        if (cells && trees_take_moments(groups)) {
+        if (cells) {
             moments = sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return lit[k].moments; });
         }
         bodies[i]->tree = std::make_shared<const PointTree>(

@@ -56,11 +56,6 @@ struct LitPoints {
 
 // The cells that an object's tree is made with; null where its light was baked at the points alone.
 std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const LitPoints& lit);
-// Whether trees are given the moments of light: they keep one centre of light a cell for all groups together, which would
-// move when one group's light is changed after the render.
-inline bool trees_take_moments(std::size_t groups) {
-    return groups == 1;
-}
 
 // A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
 std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,

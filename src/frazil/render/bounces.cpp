@@ -101,7 +101,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             light.groups = groups;
             light.values =
                 sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return last[k].values; });
-            if (cells[i] && trees_take_moments(groups)) {
+            if (cells[i]) {
                 light.moments =
                     sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return last[k].moments; });
             }

@@ -59,7 +59,7 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
         bodies[i]->overlay_tree = std::make_unique<const PointTree>(
             lit[i].points, taken_of(lit[i].irradiance), overlays * groups, bodies[i]->profile,
             bodies[i]->material->ramp, cells.get(),
-            cells && trees_take_moments(groups) ? taken_of(lit[i].moments) : std::vector<V3f>());
+            cells ? taken_of(lit[i].moments) : std::vector<V3f>());
     }
 }
 
