@@ -57,9 +57,10 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         while (end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object) ++end;
         const Medium& medium = body.material->medium;
         const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
-        const auto [positions, place_of] =
+        auto [positions, place_of] =
             shared_places(&tile.requests[begin], end - begin, kCell * std::min(body.spacing, mean_free_path));
         tile.gathers += positions.size();
+        for (V3f& position : positions) position = position * body.to_points;
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
         const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
