@@ -1,12 +1,32 @@
 #include "frazil/points/point_lookup.h"
 
+#include <array>
 #include <bit>
 
 #include "frazil/base/random.h"
 
 namespace frazil {
+namespace {
 
-PointLookup::PointLookup(const PointSet& points) : points_(points) {
+// What rounding may take off the distance of a cell, relative.
+constexpr float kRoundoff = 1e-3f;
+
+// Of a cell, itself included, less one: the near ones first, so that few of the far ones need to be looked at.
+constexpr std::array<std::array<std::uint8_t, 3>, 27> kNeighbours = [] {
+    std::array<std::array<std::uint8_t, 3>, 27> all{};
+    std::size_t count = 0;
+    for (int steps = 0; steps <= 3; ++steps) {
+        for (std::uint8_t i = 0; i < 27; ++i) {
+            const std::array<std::uint8_t, 3> at{std::uint8_t(i / 9), std::uint8_t(i / 3 % 3), std::uint8_t(i % 3)};
+            if ((at[0] != 1) + (at[1] != 1) + (at[2] != 1) == steps) all[count++] = at;
+        }
+    }
+    return all;
+}();
+
+}  // namespace
+
+PointLookup::PointLookup(const PointSet& points) {
     Box3f box;
     for (const V3f& position : points.positions) box.extendBy(position);
     if (!box.isEmpty()) origin_ = box.min;
@@ -20,17 +40,21 @@ PointLookup::PointLookup(const PointSet& points) : points_(points) {
     first_.assign(std::size_t(buckets) + 1, 0);
     for (std::size_t i = 0; i < points.size(); ++i) {
         const V3f& p = points.positions[i];
-        bucket_of[i] = bucket(cell(p.x, 0), cell(p.y, 1), cell(p.z, 2));
+        const auto cell = [&](int axis) {
+            return static_cast<std::int64_t>(std::floor((double(p[axis]) - origin_[axis]) * inverse_size_));
+        };
+        bucket_of[i] = bucket(cell(0), cell(1), cell(2));
         ++first_[bucket_of[i] + 1];
     }
     for (std::size_t b = 0; b < buckets; ++b) first_[b + 1] += first_[b];
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    indices_.resize(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) indices_[next[bucket_of[i]]++] = std::uint32_t(i);
-}
-
-std::int64_t PointLookup::cell(float coordinate, int axis) const {
-    return static_cast<std::int64_t>(std::floor((double(coordinate) - origin_[axis]) * inverse_size_));
+    entries_.resize(points.size());
+    normals_.resize(points.normals.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const std::uint32_t at = next[bucket_of[i]]++;
+        entries_[at] = {points.positions[i], std::uint32_t(i)};
+        if (!normals_.empty()) normals_[at] = points.normals[i];
+    }
 }
 
 std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -38,25 +62,32 @@ std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z
 }
 
 std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {
-    const std::int64_t x = cell(position.x, 0), y = cell(position.y, 1), z = cell(position.z, 2);
+    std::int64_t cell[3];
+    float beyond[3][3];  // per axis: squared distance to the cell before, of the position, and after, in cells
+    for (int axis = 0; axis < 3; ++axis) {
+        const double x = (double(position[axis]) - origin_[axis]) * inverse_size_, floor = std::floor(x);
+        const float within = static_cast<float>(x - floor);
+        cell[axis] = static_cast<std::int64_t>(floor);
+        beyond[axis][0] = within * within;
+        beyond[axis][1] = 0.0f;
+        beyond[axis][2] = (1.0f - within) * (1.0f - within);
+    }
     std::uint32_t on_side = kNone, any = kNone;
-    // Nothing farther: distant cells may share a bucket.
-    const float farthest = inverse_size_ > 0.0 ? static_cast<float>(2.0 / inverse_size_) : 0.0f;
-    float nearest_on_side = farthest * farthest, nearest_any = nearest_on_side;
-    for (std::int64_t dx = -1; dx <= 1; ++dx) {
-        for (std::int64_t dy = -1; dy <= 1; ++dy) {
-            for (std::int64_t dz = -1; dz <= 1; ++dz) {
-                const std::uint32_t b = bucket(x + dx, y + dy, z + dz);
-                for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
-                    const std::uint32_t i = indices_[k];
-                    const float distance = (points_.positions[i] - position).length2();
-                    const auto keep = [&](float& least, std::uint32_t& best) {
-                        if (distance < least || (distance == least && i < best)) least = distance, best = i;
-                    };
-                    keep(nearest_any, any);
-                    if (points_.normals[i].dot(normal) > 0.0f) keep(nearest_on_side, on_side);
-                }
-            }
+    const float size = inverse_size_ > 0.0 ? static_cast<float>(1.0 / inverse_size_) : 0.0f;
+    // Nothing farther than two cells: distant ones may share a bucket.
+    float nearest_on_side = 4.0f * size * size, nearest_any = nearest_on_side;
+    const float size2 = (1.0f - kRoundoff) * size * size;
+    for (const auto& [dx, dy, dz] : kNeighbours) {
+        if ((beyond[0][dx] + beyond[1][dy] + beyond[2][dz]) * size2 > nearest_on_side) continue;
+        const std::uint32_t b = bucket(cell[0] + dx - 1, cell[1] + dy - 1, cell[2] + dz - 1);
+        for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
+            const auto& [p, i] = entries_[k];
+            const float distance = (p - position).length2();
+            const auto keep = [&](float& least, std::uint32_t& best) {
+                if (distance < least || (distance == least && i < best)) least = distance, best = i;
+            };
+            keep(nearest_any, any);
+            if (distance <= nearest_on_side && normals_[k].dot(normal) > 0.0f) keep(nearest_on_side, on_side);
         }
     }
     return on_side != kNone ? on_side : any;

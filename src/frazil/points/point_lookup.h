@@ -1,7 +1,7 @@
 // The point that stands for a place on the surface: the nearest one on its side.
 // Model: a hashed grid with cells of the spacing; maximal points (poisson.h) leave no place farther than that from its point.
 // Units: metres.
-// Valid: thread-safe after construction; the points must outlive it. Ties go to the lower index.
+// Valid: thread-safe after construction. Ties go to the lower index.
 // Not: places off the surface.
 #pragma once
 
@@ -23,15 +23,19 @@ class PointLookup {
     std::uint32_t nearest(const V3f& position, const V3f& normal) const;
 
   private:
-    std::int64_t cell(float coordinate, int axis) const;
     std::uint32_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const;
 
-    const PointSet& points_;
+    struct Entry {
+        V3f position;
+        std::uint32_t index;  // of the point
+    };
+
     V3f origin_ = V3f(0.0f);
     double inverse_size_ = 0.0;
     std::uint32_t mask_ = 0;
-    std::vector<std::uint32_t> first_;    // of each bucket in indices_; one more than buckets
-    std::vector<std::uint32_t> indices_;  // of the points, bucket by bucket
+    std::vector<std::uint32_t> first_;  // of each bucket in entries_; one more than buckets
+    std::vector<Entry> entries_;        // of the points, bucket by bucket
+    std::vector<V3f> normals_;          // in the same order
 };
 
 }  // namespace frazil
