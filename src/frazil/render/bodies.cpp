@@ -65,7 +65,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             plain_kernel = make_tree_kernel(*profile);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
-        bodies[i] = std::make_unique<Body>(Body{material, boundary, *profile, kernel, plain_kernel, albedo(*profile)});
+        bodies[i] = std::make_unique<Body>(material, boundary, *profile, kernel, plain_kernel);
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
@@ -159,16 +159,16 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-void plant_trees(const Scene& scene, std::vector<LitPoints>& lit, bool takes_light, std::size_t groups,
-                 const RayScene& ray_scene, bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats) {
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                 const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
     // A bake from elsewhere has no cells: make those that its light was a mean over.
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-        if (!bodies[i] || lit[i].moments.empty() || lit[i].points.cloud().cells()) continue;
+        if (!bodies[i] || lit[i].moments.empty()) continue;
         PointCloud& cloud = lit[i].points.cloud();
-        const Mesh mesh = mesh_at_cloud(scene, i, lit[i].points);
-        cloud.set_cells(std::make_shared<const Cells>(cells_of(cloud.points(), mesh, 1)));
+        cloud.add_cells(
+            [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
         cloud.drop_places();
     }
     const TranslucencySets sets(scene, ray_scene, bodies, lit);
@@ -191,10 +191,7 @@ void plant_trees(const Scene& scene, std::vector<LitPoints>& lit, bool takes_lig
                                          sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }),
                                          groups,
                                          sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
-        if (takes_light && is_alone) {
-            lit[i].irradiance = {};
-            lit[i].moments = {};
-        }
+        if (is_alone) has_taken(i);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
         }

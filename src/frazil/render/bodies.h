@@ -5,6 +5,7 @@
 // Not: light that diffuses from one body into another that it touches.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -23,13 +24,22 @@
 namespace frazil {
 
 struct Body {
+    Body(const IceMaterial* of_material, std::shared_ptr<const DielectricAlbedo> with_boundary,
+         const Profile& with_profile, std::shared_ptr<const TreeKernel> sum, std::shared_ptr<const TreeKernel> plain_sum)
+        : material(of_material),
+          boundary(std::move(with_boundary)),
+          profile(with_profile),
+          kernel(std::move(sum)),
+          plain_kernel(std::move(plain_sum)),
+          total_reflectance(albedo(with_profile)) {}
+
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
     std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
     Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
-    // Trees stand where their points do: places are brought there by `to_points`.
-    M44f to_points = M44f();
+    // Trees stand where their points do: places are brought there by `to_points`, and `to_own_points` for the overlays'.
+    M44f to_points, to_own_points;
     std::shared_ptr<const PointTree> tree;          // none where the object has no surface; one for a translucency set
     std::shared_ptr<const PointTree> thickness;     // ThicknessTrees
     std::shared_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
@@ -109,10 +119,10 @@ std::vector<Passage> passages_of(const Scene& scene);
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
-// use for it or a layer `wants_depth`. With `takes_light` the light is given up as the trees take it over. Fills points, nodes
-// and seconds of the stats.
-void plant_trees(const Scene& scene, std::vector<LitPoints>& lit, bool takes_light, std::size_t groups,
-                 const RayScene& ray_scene, bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats);
+// use for it or a layer `wants_depth`. `has_taken(i)` is called when the light of an object is needed no more. Fills points,
+// nodes and seconds of the stats.
+void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                 const std::function<void(std::size_t)>& has_taken);
 
 }  // namespace frazil

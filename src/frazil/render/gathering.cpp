@@ -18,6 +18,11 @@ struct Places {
     std::vector<std::uint32_t> of_request;
 };
 
+std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
+    for (V3f& position : positions) position = position * matrix;
+    return positions;
+}
+
 Places shared_places(const GatherRequest* requests, std::size_t count, float cell) {
     struct Key {
         std::uint64_t hash;
@@ -57,15 +62,18 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         while (end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object) ++end;
         const Medium& medium = body.material->medium;
         const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
-        auto [positions, place_of] =
+        const auto [places, place_of] =
             shared_places(&tile.requests[begin], end - begin, kCell * std::min(body.spacing, mean_free_path));
-        tile.gathers += positions.size();
-        for (V3f& position : positions) position = position * body.to_points;
+        tile.gathers += places.size();
+        const std::vector<V3f> positions = moved(places, body.to_points);
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
         const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
         Gathered by_overlay;
-        if (body.overlay_tree) by_overlay = body.overlay_tree->gather(positions.data(), positions.size(), options);
+        if (body.overlay_tree) {
+            const std::vector<V3f> own = moved(places, body.to_own_points);
+            by_overlay = body.overlay_tree->gather(own.data(), own.size(), options);
+        }
         const std::vector<Rgb> thin =
             thickness_gains(body.thickness.get(), positions.data(), positions.size(), with_layers);
 

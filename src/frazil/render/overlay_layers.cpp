@@ -55,6 +55,7 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
             }
             return result;
         };
+        bodies[i]->to_own_points = lit[i].points.to_cloud();
         bodies[i]->overlay_tree = make_tree(lit[i].points, bodies[i]->kernel, taken_of(lit[i].irradiance),
                                             overlays * groups, taken_of(lit[i].moments));
     }

@@ -4,12 +4,20 @@
 
 namespace frazil {
 
-void PointCloud::set_cells(std::shared_ptr<const Cells> cells) {
-    cells_ = std::move(cells);
+std::shared_ptr<const Cells> PointCloud::cells() const {
+    const std::lock_guard lock(mutex_);
+    return cells_;
+}
+
+void PointCloud::add_cells(const std::function<Cells(const PointSet&)>& make) {
+    const std::lock_guard lock(mutex_);
+    if (cells_) return;
+    cells_ = std::make_shared<const Cells>(make(points_));
     clusters_ = nullptr;
 }
 
 void PointCloud::drop_places() {
+    const std::lock_guard lock(mutex_);
     if (!cells_ || cells_->places.empty()) return;
     Cells moments;
     moments.areas = cells_->areas;
@@ -18,14 +26,16 @@ void PointCloud::drop_places() {
     cells_ = std::make_shared<const Cells>(std::move(moments));
 }
 
-const std::shared_ptr<const PointClusters>& PointCloud::clusters() {
+std::shared_ptr<const PointClusters> PointCloud::clusters() {
+    const std::lock_guard lock(mutex_);
     if (!clusters_) clusters_ = std::make_shared<const PointClusters>(cluster_points(points_, cells_.get()));
     return clusters_;
 }
 
-const PointLookup& PointCloud::lookup() {
-    if (!lookup_) lookup_ = std::make_unique<const PointLookup>(points_);
-    return *lookup_;
+std::shared_ptr<const PointLookup> PointCloud::lookup() {
+    const std::lock_guard lock(mutex_);
+    if (!lookup_) lookup_ = std::make_shared<const PointLookup>(points_);
+    return lookup_;
 }
 
 PointSet PlacedPoints::in_world() const {

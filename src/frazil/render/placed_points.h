@@ -1,11 +1,13 @@
 // A body's points where it stands: a cloud that all bodies of its shape share, and the way from there into the world.
 // Model: the way is a rotation or reflection and a move, so that distances and areas are the same in both.
 // Units: metres.
-// Valid: what is made when it is first asked for is made by one thread; read by many.
+// Valid: thread-safe.
 // Not: the light on the points, which every body has for itself (LitPoints).
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <mutex>
 
 #include "frazil/points/cells.h"
 #include "frazil/points/point_lookup.h"
@@ -20,20 +22,22 @@ class PointCloud {
 
     const PointSet& points() const { return points_; }
     // Null where light is baked at the points alone.
-    const std::shared_ptr<const Cells>& cells() const { return cells_; }
-    void set_cells(std::shared_ptr<const Cells> cells);
+    std::shared_ptr<const Cells> cells() const;
+    // Give it cells unless it has some.
+    void add_cells(const std::function<Cells(const PointSet&)>& make);
     // Places are of use to bakes alone.
     void drop_places();
 
     // Made when first asked for, with the cells that are there by then.
-    const std::shared_ptr<const PointClusters>& clusters();
-    const PointLookup& lookup();
+    std::shared_ptr<const PointClusters> clusters();
+    std::shared_ptr<const PointLookup> lookup();
 
   private:
     PointSet points_;
+    mutable std::mutex mutex_;  // over what follows
     std::shared_ptr<const Cells> cells_;
     std::shared_ptr<const PointClusters> clusters_;
-    std::unique_ptr<const PointLookup> lookup_;
+    std::shared_ptr<const PointLookup> lookup_;
 };
 
 class PlacedPoints {
@@ -54,6 +58,11 @@ class PlacedPoints {
     Cells cells_in_world() const;
     // Vectors of the world, such as moments of light, in the frame of the cloud.
     std::vector<V3f> into_cloud(std::vector<V3f> vectors) const;
+    V3f into_cloud(const V3f& vector) const {
+        V3f turned;
+        to_cloud_.multDirMatrix(vector, turned);
+        return turned;
+    }
 
   private:
     std::shared_ptr<PointCloud> cloud_;

@@ -71,7 +71,7 @@ void TranslucencySets::unite(Union& set) const {
                               set.shells.contains(own.positions[k] - skin, object, object);
             }
         });
-        has_cells = has_cells && lit_[object].points.cloud().cells();
+        has_cells = has_cells && lit_[object].points.cloud().cells() != nullptr;
         const Cells own_cells = has_cells ? lit_[object].points.cells_in_world() : Cells{};
         points.spacing = std::max(points.spacing, own.spacing);
         for (std::size_t k = 0; k < own.size(); ++k) {
@@ -87,7 +87,7 @@ void TranslucencySets::unite(Union& set) const {
         }
     }
     set.points = PlacedPoints(std::move(points));
-    if (has_cells) set.points.cloud().set_cells(std::make_shared<const Cells>(std::move(cells)));
+    if (has_cells) set.points.cloud().add_cells([&](const PointSet&) { return std::move(cells); });
 }
 
 const TranslucencySets::Union* TranslucencySets::find(std::size_t leader) const {
