@@ -25,16 +25,20 @@ struct Sightline {
     std::uint32_t body;      // whose point is seen: a leader of translucency sets
     std::uint32_t sender;    // index into the points of its set
     Rgb weight;              // irradiance per exitance
-    V3f offset;              // as in BounceHit
+    float mirrored;          // irradiance per irradiance that enters there: what the surface reflects
 };
 
 // All that an object's points see, batch after batch of points.
 using Sightlines = std::vector<std::vector<Sightline>>;
 
-// What a body sends out, point by point, (N, groups): the light of the last bounce alone, compensated.
-std::vector<Rgb> exitance_of(const Body& body, const PlacedPoints& points, const std::vector<Rgb>& irradiance,
-                             const std::vector<V3f>& moments, std::size_t groups, const std::vector<Rgb>& gains,
-                             const GatherOptions& options) {
+// Light of the last bounce alone, (N, groups) per point: what enters a body, and its exitance, compensated.
+struct Exchange {
+    std::vector<Rgb> entering, exitance;
+};
+
+Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<Rgb> irradiance,
+                     const std::vector<V3f>& moments, std::size_t groups, const std::vector<Rgb>& gains,
+                     const GatherOptions& options) {
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
     const auto tree = make_tree(points, body.plain_kernel, irradiance, groups, moments);
     const std::vector<V3f>& positions = points.cloud().points().positions;
@@ -42,7 +46,15 @@ std::vector<Rgb> exitance_of(const Body& body, const PlacedPoints& points, const
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
-    return std::move(gathered.exitance);
+    return {std::move(irradiance), std::move(gathered.exitance)};
+}
+
+// What a boundary reflects towards wo per unit of irradiance that enters, where light comes evenly from all around: with what
+// leaves the core it makes a white furnace of radiance one. Other light is reflected as if it were spread so.
+float mirrored_radiance(const Body& body, const Surface& surface, const V3f& wo) {
+    const float roughness = surface.covering.roughness;
+    return (1.0f - body.transmittance(surface.normal.dot(wo), roughness)) * kInvPi /
+           body.transmittance_average(roughness);
 }
 
 // Finds the points of ice that rays meet.
@@ -68,8 +80,10 @@ class IceFinder {
                                                                   points.into_cloud(hit.surface.geometric_normal));
             if (point == PointLookup::kNone) continue;
             const Surface surface = resolver_.resolve(hit.surface, hit.direction);
-            const Rgb scale = bodies_[hit.surface.placement]->radiance_per_exitance(surface, -hit.direction);
-            found.push_back({hit.point, static_cast<std::uint32_t>(leader), point, scale * hit.weight, hit.offset});
+            const Body& body = *bodies_[hit.surface.placement];
+            found.push_back({hit.point, static_cast<std::uint32_t>(leader), point,
+                             body.radiance_per_exitance(surface, -hit.direction) * hit.weight,
+                             mirrored_radiance(body, surface, -hit.direction) * hit.weight});
         }
         found.shrink_to_fit();
         return found;
@@ -82,17 +96,16 @@ class IceFinder {
     std::vector<std::shared_ptr<const PointLookup>> lookups_;  // by leader
 };
 
-// Light along all sightlines of an object: what the exitance of the points that are seen brings.
-void add_light(const Sightlines& sightlines, const std::vector<std::vector<Rgb>>& exitance, Irradiance& light) {
+// Light along all sightlines of an object: what the points that are seen send.
+void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, Irradiance& light) {
     parallel_for(sightlines.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t batch = begin; batch < end; ++batch) {
             for (const Sightline& line : sightlines[batch]) {
-                const Rgb* sent = &exitance[line.body][line.sender * light.groups];
+                const Exchange& body = bodies[line.body];
+                const std::size_t from = line.sender * light.groups, to = line.receiver * light.groups;
                 for (std::size_t g = 0; g < light.groups; ++g) {
-                    const Rgb value = sent[g] * line.weight;
-                    light.values[line.receiver * light.groups + g] += value;
-                    if (light.moments.empty()) continue;
-                    light.moments[line.receiver * light.groups + g] += line.offset * (value.x + value.y + value.z);
+                    light.values[to + g] +=
+                        body.exitance[from + g] * line.weight + body.entering[from + g] * line.mirrored;
                 }
             }
         }
@@ -169,30 +182,31 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             },
             [&](float cosine) { return bodies[i]->transmittance(cosine, bodies[i]->material->roughness.value); },
             bake_options, progress);
+        // Bounced light is even over a cell, as far as so few rays can tell.
+        last[i].moments = {};
+        last[i].errors = {};
         stats.bake_rays += last[i].rays;
         stats.dropped_samples += last[i].dropped_samples;
     }
 
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
-        std::vector<std::vector<Rgb>> exitance(lit.size());
+        std::vector<Exchange> exchange(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (!gains[i] || lit[i].points.size() == 0) continue;
             // At first the light that is there, then what the last bounce brought.
             const auto values = [&](std::size_t k) { return bounce == 0 ? &lit[k].irradiance : &last[k].values; };
-            const auto moments = [&](std::size_t k) { return bounce == 0 ? &lit[k].moments : &last[k].moments; };
-            exitance[i] = exitance_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values),
-                                      sets.united<V3f>(i, groups, moments), groups, *gains[i], options.gather);
+            exchange[i] =
+                exchange_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values),
+                            bounce == 0 ? sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; })
+                                        : std::vector<V3f>(),
+                            groups, *gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;
-            if (bounce > 0) {
-                std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
-                std::fill(last[i].moments.begin(), last[i].moments.end(), V3f(0.0f));
-            }
-            add_light(sightlines[i], exitance, last[i]);
+            if (bounce > 0) std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
+            add_light(sightlines[i], exchange, last[i]);
             keep_entering(entering[i], last[i]);
             for (std::size_t k = 0; k < last[i].values.size(); ++k) lit[i].irradiance[k] += last[i].values[k];
-            for (std::size_t k = 0; k < last[i].moments.size(); ++k) lit[i].moments[k] += last[i].moments[k];
         }
         if (progress) progress->update("bounce", 1.0);  // rays took the time; asks whether to go on
     }

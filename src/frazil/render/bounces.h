@@ -1,10 +1,10 @@
 // Light that reaches the points of ice by way of other surfaces: ice lights ice, and diffuse surfaces light ice.
 // Model: each bounce is one gather at the points themselves, compensated as the material says, and one look around from
-//   every point: ice that it sees sends the exitance of its nearest point; opaque surfaces reflect, diffusely, what comes
-//   straight from lights.
+//   every point: ice that it sees sends the exitance of its nearest point, and reflects light as if it came there evenly from
+//   all around; opaque surfaces reflect, diffusely, what comes straight from lights.
 // Units: W/m².
 // Valid: the same bits for any number of threads.
-// Not: light that ice throws on opaque surfaces and these throw back; glossy paths.
+// Not: light that ice throws on opaque surfaces and these throw back; mirror images in ice.
 #pragma once
 
 #include "frazil/render/bodies.h"
