@@ -34,10 +34,11 @@ float lobe_spread(float alpha) {
 
 }  // namespace
 
-IceCore PathTracer::core_at(const Surface& surface, int body) const {
+IceCore PathTracer::core_at(const Surface& surface, int body, bool from_inside) const {
     IceCore core;
     core.body = body;
     core.position = surface.position;
+    core.normal = from_inside ? -surface.geometric_normal : surface.geometric_normal;
     core.radiance_per_exitance = bodies_[std::size_t(body)]->inner_radiance_per_exitance(surface);
     return core;
 }
@@ -80,10 +81,9 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
 bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const {
     const int body = interiors_.filling(path.inside);
     if (body == InsideOf::kNone) return true;
-    constexpr float kFarAway = 1e18f;
-    const float way = std::min(length, kFarAway);
+    const Interiors::Depth through = interiors_.depth(body, path.ray, length);
     const Medium& medium = bodies_[std::size_t(body)]->material->medium;
-    const Rgb unscattered = exp(medium.sigma_s_prime * -way) * path.clear;
+    const Rgb unscattered = exp(medium.sigma_s_prime * -through.scattering) * path.clear;
 
     Rgb once(0.0f);
     if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
@@ -99,7 +99,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
     }
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
-    path.scale(unscattered * exp(medium.sigma_a * -way));
+    path.scale(unscattered * exp(medium.sigma_a * -through.absorption));
     path.clear = path.core_share = 1.0f;
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
@@ -115,17 +115,17 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         path.inside = crossing.beyond;
         path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ++path.straight;
-        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to);
+        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to, false);
         return true;
     }
     if (path.inner >= kMaxInnerBounces) {
-        request_gather(path, core_at(surface, crossing.from), Rgb(1.0f), tile);
+        request_gather(path, core_at(surface, crossing.from, true), Rgb(1.0f), tile);
         return false;
     }
     ++path.inner;
     // What lies on the boundary is seen from below as the core sees it.
     if (const float covered = surface.covering.covered; covered > kHiding) {
-        request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
+        request_gather(path, core_at(surface, crossing.from, true), Rgb(covered), tile);
         path.scale(Rgb(1.0f - covered));
         if (covered >= 1.0f) return false;
     }
@@ -156,7 +156,9 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const int body = interiors_.filling(path.inside);
     path.spread += lobe_spread(alpha);
     path.add_blur(alpha);
-    if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
+    if (body != InsideOf::kNone) {
+        path.begin_piece(core_at(surface, body, body == crossing.from), bodies_[std::size_t(body)]->material->volume);
+    }
     return true;
 }
 
@@ -179,6 +181,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.pixel = path.pixel;
     request.subset = tile.subset;
     request.position = core.position;
+    request.normal = core.normal;
     request.is_primary = core.is_primary;
     request.entering = core.entering;
     request.entering_group = core.entering_group;

@@ -19,7 +19,12 @@ bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& norma
     if (!ice.has_sheets()) return false;
     // Nothing is seen through so much ice.
     const Rgb sigma = ice.medium.sigma_s_prime + ice.medium.sigma_a;
-    const float reach = std::min(length, 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f));
+    const float deepest = 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f);
+    const DensityField* density = interiors_.density(body);
+    const float reach = density && ice.density.absorption == 1.0f
+                            ? density->place(path.ray.origin, path.ray.direction, deepest, length)
+                        : density ? length
+                                  : std::min(length, deepest);
     const auto object = static_cast<std::uint32_t>(body);
     const V3f origin = path.ray.origin * resolver_.world_to_rest(object);
     V3f direction;
@@ -78,6 +83,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
         IceCore core = path.core;
         core.is_primary = false;
         core.position = position;
+        core.normal = V3f(0.0f);
         request_gather(path, core, color, tile);
         return false;
     }
@@ -99,6 +105,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     IceCore core = path.core;
     core.is_primary = false;
     core.position = position;
+    core.normal = V3f(0.0f);
     path.begin_piece(core, bodies_[std::size_t(body)]->material->volume);
     return true;
 }
