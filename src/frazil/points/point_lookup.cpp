@@ -6,13 +6,8 @@
 #include "frazil/base/random.h"
 
 namespace frazil {
-namespace {
 
-// What rounding may take off the distance of a cell, relative.
-constexpr float kRoundoff = 1e-3f;
-
-// Of a cell, itself included, less one: the near ones first, so that few of the far ones need to be looked at.
-constexpr std::array<std::array<std::uint8_t, 3>, 27> kNeighbours = [] {
+const std::array<std::array<std::uint8_t, 3>, 27> PointLookup::kNeighbours = [] {
     std::array<std::array<std::uint8_t, 3>, 27> all{};
     std::size_t count = 0;
     for (int steps = 0; steps <= 3; ++steps) {
@@ -24,14 +19,14 @@ constexpr std::array<std::array<std::uint8_t, 3>, 27> kNeighbours = [] {
     return all;
 }();
 
-}  // namespace
-
-PointLookup::PointLookup(const PointSet& points) {
+PointLookup::PointLookup(const PointSet& points, double reach) {
     Box3f box;
     for (const V3f& position : points.positions) box.extendBy(position);
     if (!box.isEmpty()) origin_ = box.min;
-    // A hair wider than the spacing, so that what lies within it is found in the next cell at the farthest.
-    inverse_size_ = points.spacing > 0.0 ? 1.0 / (1.01 * points.spacing) : 0.0;
+    // A hair wider than the reach, so that what lies within it is found in the next cell at the farthest.
+    inverse_size_ = reach > 0.0 ? 1.0 / (1.01 * reach) : 0.0;
+    size2_ =
+        inverse_size_ > 0.0 ? (1.0f - kRoundoff) * static_cast<float>(1.0 / (inverse_size_ * inverse_size_)) : 0.0f;
     const std::uint32_t buckets = std::bit_ceil(std::max<std::uint32_t>(16, std::uint32_t(points.size())));
     mask_ = buckets - 1;
 
@@ -61,25 +56,29 @@ std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z
     return hash(std::uint32_t(x), std::uint32_t(y), std::uint32_t(z)) & mask_;
 }
 
-std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {
-    std::int64_t cell[3];
-    float beyond[3][3];  // per axis: squared distance to the cell before, of the position, and after, in cells
+std::uint32_t PointLookup::bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const {
+    return bucket(at.cell[0] + neighbour[0] - 1, at.cell[1] + neighbour[1] - 1, at.cell[2] + neighbour[2] - 1);
+}
+
+PointLookup::At PointLookup::locate(const V3f& position) const {
+    At at;
     for (int axis = 0; axis < 3; ++axis) {
         const double x = (double(position[axis]) - origin_[axis]) * inverse_size_, floor = std::floor(x);
         const float within = static_cast<float>(x - floor);
-        cell[axis] = static_cast<std::int64_t>(floor);
-        beyond[axis][0] = within * within;
-        beyond[axis][1] = 0.0f;
-        beyond[axis][2] = (1.0f - within) * (1.0f - within);
+        at.cell[axis] = static_cast<std::int64_t>(floor);
+        at.beyond[axis] = {within * within, 0.0f, (1.0f - within) * (1.0f - within)};
     }
+    return at;
+}
+
+std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {
+    const At at = locate(position);
     std::uint32_t on_side = kNone, any = kNone;
-    const float size = inverse_size_ > 0.0 ? static_cast<float>(1.0 / inverse_size_) : 0.0f;
     // Nothing farther than two cells: distant ones may share a bucket.
-    float nearest_on_side = 4.0f * size * size, nearest_any = nearest_on_side;
-    const float size2 = (1.0f - kRoundoff) * size * size;
-    for (const auto& [dx, dy, dz] : kNeighbours) {
-        if ((beyond[0][dx] + beyond[1][dy] + beyond[2][dz]) * size2 > nearest_on_side) continue;
-        const std::uint32_t b = bucket(cell[0] + dx - 1, cell[1] + dy - 1, cell[2] + dz - 1);
+    float nearest_on_side = 4.0f * size2_, nearest_any = nearest_on_side;
+    for (const auto& neighbour : kNeighbours) {
+        if (at.distance2(neighbour) * size2_ > nearest_on_side) continue;
+        const std::uint32_t b = bucket(at, neighbour);
         for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
             const auto& [p, i] = entries_[k];
             const float distance = (p - position).length2();

@@ -160,7 +160,7 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
 }
 
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
                  const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
     // A bake from elsewhere has no cells: make those that its light was a mean over.
@@ -183,6 +183,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (!sets.is_leader(i)) {
             body.tree = bodies[leader]->tree;
             body.thickness = bodies[leader]->thickness;
+            body.at_points = bodies[leader]->at_points;
             continue;
         }
         const bool is_alone = !sets.shells(i);
@@ -195,6 +196,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
         }
+        body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), plan);
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();
     }
