@@ -70,7 +70,7 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
     check_budget(kPointsPerSpacing2 * extent.spacings2, options.max_points, "spacing", asked);
 
     const double unit = spacing.per_vertex ? std::sqrt(extent.area / extent.spacings2) : spacing.constant;
-    PointsInTiles points = {mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61),
+    PointsInTiles points = {mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61), {},
                             {},   {}};
     try {
         const double pairs = 2.0 * double(mesh.triangles.size()) + 4.0 * point_limit(options.max_points);
@@ -83,6 +83,7 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
 
     const std::size_t count = points.grid.count();
     points.darts.resize(count);
+    points.borders.resize(count);
     std::vector<std::uint32_t> colours[8];
     for (std::size_t i = 0; i < count; ++i) colours[points.grid.colour(i)].push_back(std::uint32_t(i));
     oneapi::tbb::enumerable_thread_specific<TileFiller> fillers([&] { return TileFiller(points); });
