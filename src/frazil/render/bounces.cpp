@@ -37,12 +37,12 @@ struct Exchange {
 };
 
 Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<Rgb> irradiance,
-                     const std::vector<V3f>& moments, std::size_t groups, const std::vector<Rgb>& gains,
-                     const GatherOptions& options) {
+                     std::size_t groups, const std::vector<Rgb>& gains, const GatherOptions& options) {
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
-    const auto tree = make_tree(points, body.plain_kernel, irradiance, groups, moments);
+    const auto tree = make_tree(points, body.plain_kernel, irradiance, groups);
     const std::vector<V3f>& positions = points.cloud().points().positions;
-    Gathered gathered = tree->gather(positions.data(), positions.size(), options);
+    // Bounces average over many points, and compensation keeps their energy: the plain sum will do.
+    Gathered gathered = tree->gather(positions.data(), positions.size(), {options.tolerance, Estimator::sum, false});
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
@@ -195,11 +195,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             if (!gains[i] || lit[i].points.size() == 0) continue;
             // At first the light that is there, then what the last bounce brought.
             const auto values = [&](std::size_t k) { return bounce == 0 ? &lit[k].irradiance : &last[k].values; };
-            exchange[i] =
-                exchange_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values),
-                            bounce == 0 ? sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; })
-                                        : std::vector<V3f>(),
-                            groups, *gains[i], options.gather);
+            exchange[i] = exchange_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values), groups,
+                                      *gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;
