@@ -121,13 +121,13 @@ class Shapes {
 
   private:
     template <class Spacing>
-    std::shared_ptr<PointCloud> place(const Object& object, const Shape& shape, const Spacing& spacing, const RenderOptions& options,
-                   Progress* progress) const {
+    std::shared_ptr<PointCloud> place(const Object& object, const Shape& shape, const Spacing& spacing,
+                                      const RenderOptions& options, Progress* progress) const {
         const PoissonOptions poisson{options.seed, true, 0};
         const Mesh mesh = transformed(scene_.meshes[object.mesh], shape.stretch);
-        return std::make_shared<PointCloud>(
-            place_in_rest(mesh, poisson.thin_walls,
-                          [&](const Mesh& rest) { return poisson_points(rest, spacing, poisson, progress); }));
+        return std::make_shared<PointCloud>(place_in_rest(mesh, poisson.thin_walls, [&](const Mesh& rest) {
+            return poisson_points(rest, spacing, poisson, progress);
+        }));
     }
 
     const Scene& scene_;

@@ -187,11 +187,11 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             continue;
         }
         const bool is_alone = !sets.shells(i);
-        body.tree = is_alone ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
-                             : make_tree(sets.points(i), body.kernel,
-                                         sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }),
-                                         groups,
-                                         sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
+        body.tree =
+            is_alone ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
+                     : make_tree(sets.points(i), body.kernel,
+                                 sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
+                                 sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
         if (is_alone) has_taken(i);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);

@@ -26,7 +26,8 @@ namespace frazil {
 
 struct Body {
     Body(const IceMaterial* of_material, std::shared_ptr<const DielectricAlbedo> with_boundary,
-         const Profile& with_profile, std::shared_ptr<const TreeKernel> sum, std::shared_ptr<const TreeKernel> plain_sum)
+         const Profile& with_profile, std::shared_ptr<const TreeKernel> sum,
+         std::shared_ptr<const TreeKernel> plain_sum)
         : material(of_material),
           boundary(std::move(with_boundary)),
           profile(with_profile),

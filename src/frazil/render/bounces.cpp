@@ -36,8 +36,8 @@ struct Exchange {
     std::vector<Rgb> entering, exitance;
 };
 
-Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<Rgb> irradiance,
-                     std::size_t groups, const std::vector<Rgb>& gains, const GatherOptions& options) {
+Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<Rgb> irradiance, std::size_t groups,
+                     const std::vector<Rgb>& gains, const GatherOptions& options) {
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
     const auto tree = make_tree(points, body.plain_kernel, irradiance, groups);
     const std::vector<V3f>& positions = points.cloud().points().positions;

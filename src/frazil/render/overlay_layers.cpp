@@ -42,7 +42,8 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0 || bodies[i]->material->overlays.empty()) continue;
         const std::size_t overlays = bodies[i]->material->overlays.size(), count = lit[i].points.size();
-        const std::vector<float> taken = resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points.in_world());
+        const std::vector<float> taken =
+            resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points.in_world());
         // As much of the light, and of its moments, as each overlay takes.
         const auto taken_of = [&](const auto& values) {
             std::remove_cvref_t<decltype(values)> result(values.size() * overlays);

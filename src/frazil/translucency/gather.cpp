@@ -82,8 +82,7 @@ struct Cut {
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared) {
         add_part(p, cell, clusters().positions[p], 1.0f, largest_squared);
         for (std::size_t g = 0; g < tree.groups; ++g) {
-            const V3f offset =
-                has_footprints ? tree.power_offset(p, g, lean_reach(cell.trace)) : V3f(0.0f);
+            const V3f offset = has_footprints ? tree.power_offset(p, g, lean_reach(cell.trace)) : V3f(0.0f);
             add_power(&tree.irradiance[p * tree.groups + g].x, clusters().areas[p], offset);
         }
     }

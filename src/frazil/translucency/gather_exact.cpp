@@ -59,8 +59,7 @@ Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estima
                 const bool is_small = estimator == Estimator::sum || radius < 1e-4 * std::hypot(r, shortest);
                 const CellFrame frame(clusters, static_cast<std::uint32_t>(p), cell);
                 for (std::size_t g = 0; g < tree.groups; ++g) {
-                    const V3f offset =
-                        tree.power_offset(static_cast<std::uint32_t>(p), g, lean_reach(cell.trace));
+                    const V3f offset = tree.power_offset(static_cast<std::uint32_t>(p), g, lean_reach(cell.trace));
                     leans[g] = frame.lean_of(offset);
                 }
                 average_over_cell(offset, frame, is_small, [&](double distance, double weight, const V2f& z) {
@@ -70,8 +69,7 @@ Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estima
                         coverage[c] += density * weight;
                         const double share = density * weight * color[c] * sum.ramp_scale[c];
                         for (std::size_t g = 0; g < tree.groups; ++g) {
-                            sums[3 * g + c] +=
-                                share * tree.irradiance[p * tree.groups + g][c] * power_at(leans[g], z);
+                            sums[3 * g + c] += share * tree.irradiance[p * tree.groups + g][c] * power_at(leans[g], z);
                         }
                     }
                 });

@@ -21,8 +21,8 @@ inline constexpr std::size_t kBlockLanes = 64;  // shading points of a block, at
 
 struct Source {
     std::array<float, 3> center;
-    std::array<float, 6> covariance;    // xx, yy, zz, and twice xy, xz, yz
-    float trace;                        // of the covariance
+    std::array<float, 6> covariance;  // xx, yy, zz, and twice xy, xz, yz
+    float trace;                      // of the covariance
     float area;
     std::array<float, 3> power;  // of all groups together, in magnitude
 };

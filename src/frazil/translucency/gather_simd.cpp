@@ -191,7 +191,8 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
             const GroupPower* powers = list.powers.data() + tile * groups;
             float* lit = block.exitance.data() + first;
             std::size_t g = 0;
-            for (; g + 4 <= groups; g += 4) add_groups<4>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
+            for (; g + 4 <= groups; g += 4)
+                add_groups<4>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
             for (; g < groups; ++g) add_groups<1>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
         }
     }

@@ -34,8 +34,7 @@ void check_light(std::size_t points, std::size_t irradiance, std::size_t groups,
                              " groups), got ", irradiance, " values."));
     }
     if (moments > 0 && moments != irradiance) {
-        throw ValueError(
-            str("PointTree: moments must be one per irradiance (", irradiance, "), got ", moments, "."));
+        throw ValueError(str("PointTree: moments must be one per irradiance (", irradiance, "), got ", moments, "."));
     }
 }
 
@@ -121,9 +120,10 @@ std::shared_ptr<const TreeKernel> make_tree_kernel(const Profile& profile, const
 PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
                      const Ramp& ramp, const Cells* cells, const std::vector<V3f>& moments) {
     if (points.size() > 0) check_light(points.size(), irradiance.size(), groups, moments.size());
-    auto clusters = std::make_shared<const PointClusters>(
-        cluster_points(points, cells, unusable(irradiance, points.size(), groups)));
-    *this = PointTree(std::move(clusters), make_tree_kernel(profile, ramp), irradiance, groups, moments);
+    const auto clusters =
+        std::make_shared<PointClusters>(cluster_points(points, cells, unusable(irradiance, points.size(), groups)));
+    *this = PointTree(clusters, make_tree_kernel(profile, ramp), irradiance, groups, moments);
+    clusters->order = {};  // no other light will come
 }
 
 PointTree::PointTree(std::shared_ptr<const PointClusters> of_clusters, std::shared_ptr<const TreeKernel> kernel,

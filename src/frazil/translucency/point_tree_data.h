@@ -42,10 +42,10 @@ struct PointTree::Impl {
     std::shared_ptr<const TreeKernel> kernel;
     std::size_t groups = 1, dropped = 0;
 
-    std::vector<Rgb> irradiance;           // (points, groups), in the clusters' order
-    std::vector<PowerLean> leans;          // (points, groups); empty where light is known at points alone
-    std::vector<float> node_powers;        // (nodes, 3 groups): Σ E A
-    std::vector<PowerLean> node_leans;     // (nodes, groups)
+    std::vector<Rgb> irradiance;        // (points, groups), in the clusters' order
+    std::vector<PowerLean> leans;       // (points, groups); empty where light is known at points alone
+    std::vector<float> node_powers;     // (nodes, 3 groups): Σ E A
+    std::vector<PowerLean> node_leans;  // (nodes, groups)
 
     // From the centroid of a point's cell, or of a node's area, to the centre of a group's power; `reach` is lean_reach()
     // of that cell or node.
