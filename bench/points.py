@@ -117,7 +117,7 @@ def measure(points: np.ndarray, places: np.ndarray, area: float) -> dict:
         "peak": float(correlation.max()),
         "peak_radius": float(middles[correlation.argmax()]),
         # How far the curve still swings: 0 = no order at a distance.
-        "ringing": float(np.abs(correlation[(middles > 1.5) & (middles < 3)] - 1).mean()),
+        "swing": float(np.abs(correlation[(middles > 1.5) & (middles < 3)] - 1).mean()),
         "min": float(nearest.min()),
         "gap": float(gap),
         "gap_over_min": float(gap / nearest.min()) if nearest.min() > 0 else None,
@@ -175,7 +175,7 @@ def table(rows: list[dict], mesh: str) -> list[str]:
 def quality_table(rows: list[dict]) -> list[str]:
     """What the points are as blue noise, as markdown."""
     lines = [
-        "| sampler | points | relative radius | gap / nearest pair | distance spread | close pairs | peak | at | ringing |",
+        "| sampler | points | relative radius | gap / nearest pair | spread | close pairs | peak | at | swing |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
@@ -184,7 +184,7 @@ def quality_table(rows: list[dict]) -> list[str]:
         gap = f"{row['gap_over_min']:.2f}" if row["gap_over_min"] else "-"
         lines.append(
             f"| {row['sampler']} | {row['points']:,} | {row['relative_radius']:.2f} | {gap} | {row['spread']:.3f} "
-            f"| {row['close_pairs']:.3f} | {row['peak']:.2f} | {row['peak_radius']:.2f} | {row['ringing']:.3f} |"
+            f"| {row['close_pairs']:.3f} | {row['peak']:.2f} | {row['peak_radius']:.2f} | {row['swing']:.3f} |"
         )
     return lines
 
