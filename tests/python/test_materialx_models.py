@@ -152,6 +152,14 @@ def test_transmission_absorbs_to_its_color_over_its_depth(tmp_path):
     assert ice.refraction_roughness == pytest.approx(0.3)
 
 
+def test_transmission_without_a_depth_tints_the_boundary(stage, tmp_path):
+    inputs = value("transmission", "float", "1") + value("transmission_color", "color3", "0.9, 0.6, 0.3")
+    model, warned = refer(stage, tmp_path, surface("standard_surface", inputs))
+    assert warned == []
+    assert model.refraction_tint == pytest.approx((0.9, 0.6, 0.3))
+    assert model.medium.sigma_a == pytest.approx((0.0, 0.0, 0.0))
+
+
 def test_transmission_that_scatters_has_a_core(stage, tmp_path):
     inputs = (
         value("transmission_weight", "float", "1")
