@@ -21,6 +21,7 @@ from frazil.formations.noise import Noise
 from frazil.formations.sky import make_sky
 from frazil.ice import ICE_PRESETS
 from frazil.image import write_png
+from gallery import save_small
 from scenery import Rock
 
 kSun = np.array([-0.65, 0.36, -0.65])  # behind the ice, to the left
@@ -181,6 +182,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("sheet", "depths", "breath"))
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
+    parser.add_argument("--docs", type=Path, help="a small copy, of 6 bits a channel")
     parser.add_argument("--size", type=int, default=150, help="pixels along a side of one picture")
     parser.add_argument("--samples", type=int, default=16, help="per pixel")
     options = parser.parse_args(arguments)
@@ -189,6 +191,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         write_png(options.output, np.ascontiguousarray(pixels))
+        if options.docs:
+            save_small(options.output, options.docs)
     except OSError as error:
         print(error, file=sys.stderr)
         return 1
