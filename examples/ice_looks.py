@@ -21,6 +21,7 @@ from frazil.formations.noise import Noise
 from frazil.formations.sky import make_sky
 from frazil.ice import ICE_PRESETS
 from frazil.image import write_png
+from gallery import save_small
 from scenery import Rock
 
 kSun = np.array([-0.65, 0.36, -0.65])  # behind the ice, to the left
@@ -93,17 +94,17 @@ def frame(at, to) -> np.ndarray:
     return matrix
 
 
-def set_scene(eye, to, focal_length: float = 50.0) -> fz.Scene:
-    """Snow, sky and sun."""
+def set_scene(eye, to, focal_length: float = 50.0, ground_color=(0.82, 0.86, 0.91), sky_light=kSkyLight) -> fz.Scene:
+    """Snow (or another ground), sky and sun."""
     scene = fz.Scene()
     ground = fz.Mesh(
         np.array([[-40, 0, 40], [40, 0, 40], [40, 0, -40], [-40, 0, -40]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
     )
-    snow = fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
+    snow = fz.StandardMaterial(diffuse_color=ground_color, roughness=0.7, ior=1.31)
     scene.add_object("/snow", scene.add_mesh(ground, "/snow"), scene.add_material("/snow", snow))
     sky = make_sky(2048, kSun, 5)
-    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (kSkyLight,), path="/sky", group="sky"))
+    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (sky_light,), path="/sky", group="sky"))
     scene.add_light(
         fz.Light(
             fz.DistantLight(2.5),
@@ -155,7 +156,9 @@ def depths(size: int, samples: int) -> np.ndarray:
     scene = set_scene((0.35, 0.75, 3.4), (0.0, 0.42, 0.0), 62.0)
     block = Block((2.0, 1.0, 1.1), 4)
     mesh = to_mesh(contour(block, *block.bounds(), 0.025).largest_piece())
-    ice = scene.add_material("/ice", fz.ice_preset("arctic_blue", age=0.12, roughness=0.04, refraction_roughness=0.05))
+    ice = scene.add_material(
+        "/ice", fz.ice_preset("arctic_blue", age=0.12, depth=kDepth, roughness=0.04, refraction_roughness=0.05)
+    )
     scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), ice, lifted(0.46))
     stone = scene.add_material("/stone", fz.StandardMaterial(diffuse_color=(0.16, 0.13, 0.11), roughness=0.6))
     for number, (x, depth) in enumerate(((-0.52, 0.05), (0.0, 0.25), (0.52, 0.5))):
@@ -166,11 +169,11 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles."""
+    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles, on slate."""
     clouds = fz.Density(contrast=1.3, size=0.35, octaves=4, absorption=0.0, seed=2)
     pictures = []
     for volume, density in ((0.0, fz.Density()), (1.0, fz.Density()), (1.0, clouds)):
-        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
+        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0, ground_color=(0.04, 0.05, 0.06), sky_light=0.2)
         ice = fz.ice_preset("fresh_breath", age=0.35, depth=4.0, spacing=0.03, volume=volume, density=density)
         add_shard(scene, ice)
         pictures.append(picture(scene, size, size, samples))
@@ -181,6 +184,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("sheet", "depths", "breath"))
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
+    parser.add_argument("--docs", type=Path, help="a small copy, of 6 bits a channel")
     parser.add_argument("--size", type=int, default=150, help="pixels along a side of one picture")
     parser.add_argument("--samples", type=int, default=16, help="per pixel")
     options = parser.parse_args(arguments)
@@ -189,6 +193,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         write_png(options.output, np.ascontiguousarray(pixels))
+        if options.docs:
+            save_small(options.output, options.docs)
     except OSError as error:
         print(error, file=sys.stderr)
         return 1
