@@ -94,17 +94,17 @@ def frame(at, to) -> np.ndarray:
     return matrix
 
 
-def set_scene(eye, to, focal_length: float = 50.0, ground_color=(0.82, 0.86, 0.91), sky_light=kSkyLight) -> fz.Scene:
-    """Snow (or another ground), sky and sun."""
+def set_scene(eye, to, focal_length: float = 50.0) -> fz.Scene:
+    """Snow, sky and sun."""
     scene = fz.Scene()
     ground = fz.Mesh(
         np.array([[-40, 0, 40], [40, 0, 40], [40, 0, -40], [-40, 0, -40]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
     )
-    snow = fz.StandardMaterial(diffuse_color=ground_color, roughness=0.7, ior=1.31)
+    snow = fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
     scene.add_object("/snow", scene.add_mesh(ground, "/snow"), scene.add_material("/snow", snow))
     sky = make_sky(2048, kSun, 5)
-    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (sky_light,), path="/sky", group="sky"))
+    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (kSkyLight,), path="/sky", group="sky"))
     scene.add_light(
         fz.Light(
             fz.DistantLight(2.5),
@@ -169,11 +169,11 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles, on slate."""
+    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles."""
     clouds = fz.Density(contrast=1.3, size=0.35, octaves=4, absorption=0.0, seed=2)
     pictures = []
     for volume, density in ((0.0, fz.Density()), (1.0, fz.Density()), (1.0, clouds)):
-        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0, ground_color=(0.04, 0.05, 0.06), sky_light=0.2)
+        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
         ice = fz.ice_preset("fresh_breath", age=0.35, depth=4.0, spacing=0.03, volume=volume, density=density)
         add_shard(scene, ice)
         pictures.append(picture(scene, size, size, samples))
