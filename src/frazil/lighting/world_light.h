@@ -63,7 +63,10 @@ class WorldLight {
     bool is_uniform_dome() const;
     // Radiance of a dome in a direction; only where is_dome().
     Rgb dome_radiance(const V3f& direction) const;
-    // The same for many, with the densities of sample(); only for a dome with an image.
+    // sample() for a place that receives on the side of `normal`: directions from behind may come with a pdf of 0. Only
+    // for a dome with an image.
+    void sample_dome(const V3f& normal, std::span<const V2f> u, std::span<LightSample> out) const;
+    // The radiances of many, with the densities of sample(); only for a dome with an image.
     void dome_radiances(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
 
   private:
