@@ -1289,6 +1289,83 @@ class Overlay:
 
     def __repr__(self) -> str: ...
 
+class Density:
+    """
+    How much denser ice is than its medium from place to place: noise, or a grid.
+
+    Parameters
+    ----------
+    values : (X, Y, Z) float32 >= 0, at least two a side, interpolated trilinearly; None = noise.
+    matrix : (4, 4) float64 for row vectors: voxel (i, j, k) lies at (i, j, k) * matrix in the object's own frame.
+    outside : density beyond the grid.
+    contrast : standard deviation of the noise's logarithm, in [0, 4]; its mean is 1.
+    size : of its widest features, metres. octaves : 1..8, each twice as fine and half as strong. seed.
+    scale : of noise or grid, >= 0.
+    absorption : how much of the density counts for sigma_a, in [0, 1]; 0 = for bubbles, which scatter alone.
+
+    Ranges are checked when the scene is rendered.
+    """
+
+    def __init__(self, values: numpy.typing.ArrayLike | None = None, matrix: Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)] | None = None, *, outside: float = 0.0, contrast: float = 0.0, size: float = 0.30000001192092896, octaves: int = 3, seed: int = 0, scale: float = 1.0, absorption: float = 1.0) -> None: ...
+
+    @property
+    def values(self) -> object: ...
+
+    @property
+    def matrix(self) -> object: ...
+
+    @property
+    def outside(self) -> float: ...
+
+    @property
+    def contrast(self) -> float: ...
+
+    @contrast.setter
+    def contrast(self, arg: float, /) -> None: ...
+
+    @property
+    def size(self) -> float: ...
+
+    @size.setter
+    def size(self, arg: float, /) -> None: ...
+
+    @property
+    def octaves(self) -> int: ...
+
+    @octaves.setter
+    def octaves(self, arg: int, /) -> None: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @seed.setter
+    def seed(self, arg: int, /) -> None: ...
+
+    @property
+    def scale(self) -> float: ...
+
+    @scale.setter
+    def scale(self, arg: float, /) -> None: ...
+
+    @property
+    def absorption(self) -> float: ...
+
+    @absorption.setter
+    def absorption(self, arg: float, /) -> None: ...
+
+    def eval(self, positions: numpy.typing.ArrayLike) -> list[float]:
+        """
+        The density at positions (N, 3) in the object's frame. A list of N floats.
+        """
+
+    def depth(self, origins: numpy.typing.ArrayLike, ends: numpy.typing.ArrayLike) -> list[float]:
+        """
+        The density's integral from origins (N, 3) straight to ends (N, 3) in the object's frame: metres of the
+        medium. A list of N floats.
+        """
+
+    def __repr__(self) -> str: ...
+
 class IceMaterial:
     """
     frazil:ice: a translucent core under a glossy dielectric boundary.
@@ -1302,6 +1379,7 @@ class IceMaterial:
     refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.
     volume : how much of the light scattered once inside is traced, in [0, 1].
     anisotropy : g of that light, in [-0.95, 0.95].
+    density : Density, by which the medium is multiplied along refracted rays, from place to place.
     priority : where bodies overlap, the highest fills the place.
     overlays : list of Overlay, from below to the top; age : 0 = fresh .. 1 = old.
     tint : RGB factor on what leaves the core, or a TextureLookup.
@@ -1317,7 +1395,7 @@ class IceMaterial:
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, density: Density = ..., priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -1390,6 +1468,12 @@ class IceMaterial:
 
     @anisotropy.setter
     def anisotropy(self, arg: float, /) -> None: ...
+
+    @property
+    def density(self) -> Density: ...
+
+    @density.setter
+    def density(self, arg: Density, /) -> None: ...
 
     @property
     def priority(self) -> int: ...

@@ -54,7 +54,7 @@ RenderOptions many_samples() {
 Mesh slab(float half_thickness) {
     Mesh box;
     for (const float z : {-half_thickness, half_thickness}) {
-        box.positions.insert(box.positions.end(), {{-50, -50, z}, {50, -50, z}, {50, 50, z}, {-50, 50, z}});
+        box.positions.insert(box.positions.end(), {{-5, -5, z}, {5, -5, z}, {5, 5, z}, {-5, 5, z}});
     }
     box.triangles = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
                      {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};

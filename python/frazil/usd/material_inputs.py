@@ -18,7 +18,7 @@ class MaterialInput:
     """
 
     name: str
-    kind: str  # float, int, color, vector, bool, token, floats, colors, normal (a map alone)
+    kind: str  # float, int, color, vector, bool, token, text, file, floats, colors, normal (a map alone)
     default: object
     minimum: float = 0.0
     maximum: float = INFINITY
@@ -212,6 +212,20 @@ PREVIEW_INPUTS: tuple[MaterialInput, ...] = (
 PREVIEW_IGNORED = frozenset({"displacement", "occlusion", "opacityMode"})
 
 
+# frazil:density, a shader whose output is connected to the input `density` of frazil:ice.
+DENSITY_INPUTS: tuple[MaterialInput, ...] = (
+    MaterialInput("file", "file", "", meaning="an OpenVDB file; its frame is that of the mesh; without it noise"),
+    MaterialInput("grid", "text", "density", meaning="the name of the file's grid"),
+    MaterialInput("scale", "float", 1.0, meaning="multiplies noise or grid"),
+    MaterialInput("absorption", "float", 1.0, 0.0, 1.0, meaning="how much of it counts for sigma_a: 0 = for bubbles"),
+    MaterialInput(
+        "contrast", "float", 1.0, 0.0, 4.0, meaning="of noise: standard deviation of its logarithm; its mean is 1"
+    ),
+    MaterialInput("size", "float", 0.3, _SMALLEST_LENGTH, length_power=1, meaning="of the noise's widest features"),
+    MaterialInput("octaves", "int", 3, 1, 8, meaning="of noise, each twice as fine and half as strong"),
+    MaterialInput("seed", "int", 0, 0, 2**31 - 1, meaning="another number, another noise"),
+)
+
 # frazil:displacement, a shader whose output is connected to a material's outputs:displacement.
 DISPLACEMENT_INPUTS: tuple[MaterialInput, ...] = (
     MaterialInput("height", "float", 0.0, -INFINITY, length_power=1, takes_texture=True, meaning="along the normal"),
@@ -257,14 +271,22 @@ def snake_case(name: str) -> str:
 def inputs_markdown(table: tuple[MaterialInput, ...] = ICE_INPUTS) -> str:
     """A table of inputs as the docs show it: frazil:ice in docs/usd.md, the others in docs/material.md."""
     lines = ["| input | type | default | range | unit | meaning |", "|---|---|---|---|---|---|"]
-    types = {"color": "color3f", "vector": "vector3f", "floats": "float[]", "colors": "color3f[]", "normal": "normal3f"}
+    types = {
+        "color": "color3f",
+        "vector": "vector3f",
+        "floats": "float[]",
+        "colors": "color3f[]",
+        "normal": "normal3f",
+        "text": "string",
+        "file": "asset",
+    }
     for row in table:
-        default = "–" if row.default is None or row.default == () else str(row.default)
+        default = "–" if row.default in (None, (), "") else str(row.default)
         unit = {1: "scene unit", -1: "1/scene unit", 0: ""}[row.length_power]
         if row.length_power and row.kind in ("color", "float") and row.default:
             default += " m"
         texture = ", texture" if row.takes_texture else ""
-        rule = "" if row.kind == "bool" else row.rule
+        rule = "" if row.kind in ("bool", "text", "file") else row.rule
         lines.append(
             f"| `{row.name}` | {types.get(row.kind, row.kind)}{texture} | {default} | {rule} | {unit} | {row.meaning} |"
         )

@@ -11,7 +11,8 @@ from .._frazil import TextureLookup
 from .context import ReadContext
 from .expression import Expression
 from .material_inputs import MaterialInput, find_input, nearest_name
-from .shading import ShaderReader
+from .shading import ShaderReader, UsdNode
+from .textures import resolve
 
 _WIDTHS = {"float": 1, "int": 1, "color": 3, "vector": 3, "normal": 3}
 
@@ -39,7 +40,16 @@ class ShaderValues:
             self.values[row.name] = self._read(reader, shader, row)
 
     def _read(self, reader: ShaderReader, shader: UsdShade.Shader, row: MaterialInput):
-        if row.kind in ("token", "bool", "floats", "colors"):
+        if row.kind == "file":
+            asset, attribute, _ = UsdNode(reader, shader).file(row.name)
+            if asset is None or not asset.path:
+                return row.default
+            self.authored.add(row.name)
+            found = resolve(self._context, asset, attribute)
+            if not found:
+                self._context.warn(self._path, f"@{asset.path}@ cannot be found. It is left out.")
+            return found
+        if row.kind in ("token", "text", "bool", "floats", "colors"):
             value = reader.raw(shader, row.name)
             if value is None:
                 return row.default
@@ -81,6 +91,8 @@ def to_constant(context: ReadContext, path, row: MaterialInput, value):
     """A constant in metres and in range; TypeError or ValueError where it is of another type."""
     if row.kind == "bool":
         return bool(np.asarray(value).reshape(-1)[0])
+    if row.kind == "text":
+        return str(value)
     if row.kind == "token":
         if str(value) in row.choices:
             return str(value)

@@ -6,19 +6,29 @@ from dataclasses import dataclass
 
 from pxr import Tf, Usd, UsdShade
 
-from .._frazil import IceMaterial, Medium, Overlay, Scene, StandardMaterial
+from .._frazil import Density, IceMaterial, Medium, Overlay, Scene, StandardMaterial
+from ..grids import read_density
 from ..ice import find_preset, preset_medium, preset_overlays
 from .context import ReadContext
 from .displacement import SurfaceDisplacement, read_displacement
 from .expression import Expression
-from .material_inputs import ICE_INPUTS, OVERLAY_INPUTS, PREVIEW_IGNORED, PREVIEW_INPUTS, find_input, snake_case
+from .material_inputs import (
+    DENSITY_INPUTS,
+    ICE_INPUTS,
+    OVERLAY_INPUTS,
+    PREVIEW_IGNORED,
+    PREVIEW_INPUTS,
+    find_input,
+    snake_case,
+)
 from .material_values import ShaderValues, texcoord_name, to_value
-from .mtlx_library import ICE_NODE, OVERLAY_NODE, OVERLAY_SLOTS
+from .mtlx_library import DENSITY_NODE, ICE_NODE, OVERLAY_NODE, OVERLAY_SLOTS
 from .shading import ShaderReader
 from .surface_models import MODELS, SurfaceModelReader
 
 ICE_SHADERS = ("frazil:ice", ICE_NODE)
 OVERLAY_SHADERS = ("frazil:overlay", OVERLAY_NODE)
+DENSITY_SHADERS = ("frazil:density", DENSITY_NODE)
 PREVIEW_SHADERS = ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader")
 # The surface of the first of these that the material has is read.
 RENDER_CONTEXTS = ("frazil", "mtlx", "")
@@ -125,7 +135,9 @@ class MaterialReader:
 
     def _read_ice(self, shader: UsdShade.Shader):
         path = shader.GetPath()
-        read = ShaderValues(self._shaders, shader, ICE_INPUTS, frozenset(OVERLAY_SLOTS), (_OVERLAY_PREFIX,))
+        read = ShaderValues(
+            self._shaders, shader, ICE_INPUTS, frozenset((*OVERLAY_SLOTS, "density")), (_OVERLAY_PREFIX,)
+        )
         values = read.values
         name, scale = values.pop("preset"), values.pop("preset_scale")
         preset = find_preset(name) if name != "none" else None
@@ -142,6 +154,7 @@ class MaterialReader:
         model = IceMaterial(
             medium,
             overlays=overlays + authored,
+            density=self._read_density(shader),
             **{key: value for key, value in values.items() if key not in in_medium},
         )
         return model, texcoord_name(self._context, path, [*read.expressions.values(), *masks])
@@ -201,6 +214,29 @@ class MaterialReader:
             if "mask" in read.expressions:
                 masks.append(read.expressions["mask"])
         return overlays, masks
+
+    def _read_density(self, ice: UsdShade.Shader) -> Density:
+        """The density that is connected; the same everywhere where there is none, or none that can be read."""
+        shader = self._shaders.shader_of(ice, "density")
+        if shader is None or shader.GetShaderId() not in DENSITY_SHADERS:
+            if ice.GetInput("density"):
+                self._context.warn(
+                    ice.GetPath(), f"density must be connected to a {DENSITY_SHADERS[0]}. It is left out."
+                )
+            return Density()
+        values = ShaderValues(self._shaders, shader, DENSITY_INPUTS)
+        noise = {name: values.values[name] for name in ("scale", "absorption", "contrast", "size", "octaves", "seed")}
+        if "file" not in values.authored:
+            return Density(**noise)
+        file, grid = values.values["file"], values.values["grid"]
+        if not file:
+            return Density()
+        try:
+            return read_density(file, grid, scale=noise["scale"], absorption=noise["absorption"])
+        except (OSError, KeyError, ValueError, ImportError) as error:
+            message = str(error.args[0]) if isinstance(error, KeyError) else str(error)
+            self._context.warn(shader.GetPath(), f"{message} The density is left out.")
+            return Density()
 
     def _check_ramp(self, path, distances, colors):
         if len(distances) != len(colors):

@@ -130,7 +130,7 @@ class _Material:
         return shader
 
     def _write_input(self, shader: UsdShade.Shader, node_input: mx.Input) -> None:
-        if node_input.getType() == "overlayshader":
+        if node_input.getType() in ("overlayshader", "densityshader"):
             kind = _VALUE_TYPES.Token
         else:
             kind = _TYPES.get(node_input.getType())

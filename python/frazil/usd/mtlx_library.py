@@ -11,12 +11,13 @@ from xml.sax.saxutils import quoteattr
 
 import MaterialX as mx
 
-from .material_inputs import DISPLACEMENT_INPUTS, ICE_INPUTS, INFINITY, OVERLAY_INPUTS, MaterialInput
+from .material_inputs import DENSITY_INPUTS, DISPLACEMENT_INPUTS, ICE_INPUTS, INFINITY, OVERLAY_INPUTS, MaterialInput
 
 LIBRARY_FILE = Path(__file__).parents[1] / "mtlx" / "frazil.mtlx"
 ICE_NODE = "ND_frazil_ice_surfaceshader"
 OVERLAY_NODE = "ND_frazil_overlay"
 DISPLACEMENT_NODE = "ND_frazil_displacement"
+DENSITY_NODE = "ND_frazil_density"
 # Inputs of frazil_ice that overlays are connected to, from below to the top.
 OVERLAY_SLOTS = tuple(f"overlay{i}" for i in range(1, 9))
 
@@ -27,6 +28,8 @@ _TYPES = {
     "vector": "vector3",
     "bool": "boolean",
     "token": "string",
+    "text": "string",
+    "file": "filename",
     "floats": "floatarray",
     "colors": "color3array",
     "normal": "vector3",
@@ -47,12 +50,14 @@ def library() -> mx.Document:
 def library_text() -> str:
     """The text of mtlx/frazil.mtlx."""
     slots = [f'    <input name="{name}" type="overlayshader" uifolder="Overlays" />' for name in OVERLAY_SLOTS]
+    slots.append('    <input name="density" type="densityshader" />')
     return "\n".join(
         [
             '<?xml version="1.0"?>',
             '<materialx version="1.39">',
             "  <!-- Made from the table of material inputs: python -m frazil.usd.mtlx_library -->",
             '  <typedef name="overlayshader" doc="A layer on frazil_ice." />',
+            '  <typedef name="densityshader" doc="How dense frazil_ice is from place to place." />',
             *_definition(
                 ICE_NODE,
                 "frazil_ice",
@@ -67,6 +72,13 @@ def library_text() -> str:
                 "overlayshader",
                 OVERLAY_INPUTS,
                 "Cracks, frost, bubbles, snow or dirt on ice.",
+            ),
+            *_definition(
+                DENSITY_NODE,
+                "frazil_density",
+                "densityshader",
+                DENSITY_INPUTS,
+                "Clouds in ice: noise or an OpenVDB grid.",
             ),
             *_definition(
                 DISPLACEMENT_NODE,

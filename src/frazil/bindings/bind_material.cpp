@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "frazil/bindings/bindings.h"
+#include "frazil/material/density.h"
 #include "frazil/material/displacement.h"
 #include "frazil/material/ice.h"
 #include "frazil/material/standard.h"
@@ -222,6 +223,108 @@ void bind_overlay(nb::module_& module) {
         });
 }
 
+// The field of a density in its object's own frame, whose unit is taken for the metre.
+DensityField checked_field(const Density& density) {
+    check_density(density, "Density");
+    return {density, M44f(), M44f()};
+}
+
+void bind_density(nb::module_& module) {
+    const Density preset;
+    nb::class_<Density>(
+        module, "Density",
+        "How much denser ice is than its medium from place to place: noise, or a grid.\n\n"
+        "Parameters\n----------\n"
+        "values : (X, Y, Z) float32 >= 0, at least two a side, interpolated trilinearly; None = noise.\n"
+        "matrix : (4, 4) float64 for row vectors: voxel (i, j, k) lies at (i, j, k) * matrix in the object's own "
+        "frame.\n"
+        "outside : density beyond the grid.\n"
+        "contrast : standard deviation of the noise's logarithm, in [0, 4]; its mean is 1.\n"
+        "size : of its widest features, metres. octaves : 1..8, each twice as fine and half as strong. seed.\n"
+        "scale : of noise or grid, >= 0.\n"
+        "absorption : how much of the density counts for sigma_a, in [0, 1]; 0 = for bubbles, which scatter alone.\n\n"
+        "Ranges are checked when the scene is rendered.")
+        .def(
+            "__init__",
+            [](Density* self, const std::optional<FloatArray>& values, const std::optional<MatrixArray>& matrix,
+               float outside, float contrast, float size, int octaves, std::uint32_t seed, float scale,
+               float absorption) {
+                Density made{nullptr, contrast, size, octaves, seed, scale, absorption};
+                if (values) {
+                    if (values->ndim() != 3) {
+                        throw ValueError(
+                            str("Density: values must have shape (X, Y, Z), got ", values->ndim(), " dimensions."));
+                    }
+                    auto grid = std::make_shared<DensityGrid>();
+                    grid->size = V3i(int(values->shape(0)), int(values->shape(1)), int(values->shape(2)));
+                    grid->values.assign(values->data(), values->data() + values->size());
+                    grid->index_to_object = to_matrix_or_identity(matrix);
+                    grid->outside = outside;
+                    made.grid = std::move(grid);
+                }
+                new (self) Density(std::move(made));
+            },
+            "values"_a = nb::none(), "matrix"_a = nb::none(), nb::kw_only(), "outside"_a = 0.0f,
+            "contrast"_a = preset.contrast, "size"_a = preset.size, "octaves"_a = preset.octaves,
+            "seed"_a = preset.seed, "scale"_a = preset.scale, "absorption"_a = preset.absorption)
+        .def_prop_ro("values",
+                     [](nb::handle self) -> nb::object {
+                         const auto& grid = nb::cast<const Density&>(self).grid;
+                         if (!grid) return nb::none();
+                         return nb::cast(view(
+                             grid->values.data(),
+                             {std::size_t(grid->size.x), std::size_t(grid->size.y), std::size_t(grid->size.z)}, self));
+                     })
+        .def_prop_ro("matrix", [](const Density& d) { return from_matrix(d.grid ? d.grid->index_to_object : M44f()); })
+        .def_prop_ro("outside", [](const Density& d) { return d.grid ? d.grid->outside : 0.0f; })
+        .def_rw("contrast", &Density::contrast)
+        .def_rw("size", &Density::size)
+        .def_rw("octaves", &Density::octaves)
+        .def_rw("seed", &Density::seed)
+        .def_rw("scale", &Density::scale)
+        .def_rw("absorption", &Density::absorption)
+        .def(
+            "eval",
+            [](const Density& density, const FloatArray& positions) {
+                const auto p = to_vectors3(positions, "Density.eval: positions");
+                const DensityField field = checked_field(density);
+                std::vector<float> values(p.size());
+                {
+                    nb::gil_scoped_release release;
+                    for (std::size_t i = 0; i < p.size(); ++i) values[i] = field.at(p[i]);
+                }
+                return values;
+            },
+            "positions"_a, "The density at positions (N, 3) in the object's frame. A list of N floats.")
+        .def(
+            "depth",
+            [](const Density& density, const FloatArray& origins, const FloatArray& ends) {
+                const auto a = to_vectors3(origins, "Density.depth: origins");
+                const auto b = to_vectors3(ends, "Density.depth: ends");
+                if (a.size() != b.size()) {
+                    throw ValueError(
+                        str("Density.depth: ends must be as many as origins, ", a.size(), ", got ", b.size(), "."));
+                }
+                const DensityField field = checked_field(density);
+                std::vector<float> depths(a.size());
+                {
+                    nb::gil_scoped_release release;
+                    for (std::size_t i = 0; i < a.size(); ++i) {
+                        const V3f way = b[i] - a[i];
+                        depths[i] = field.depth(a[i], way.normalized(), way.length());
+                    }
+                }
+                return depths;
+            },
+            "origins"_a, "ends"_a,
+            "The density's integral from origins (N, 3) straight to ends (N, 3) in the object's frame: metres of the\n"
+            "medium. A list of N floats.")
+        .def("__repr__", [](const Density& d) {
+            if (!d.grid) return str("Density(contrast=", d.contrast, ", size=", d.size, ")");
+            return str("Density(", d.grid->size.x, " x ", d.grid->size.y, " x ", d.grid->size.z, " voxels)");
+        });
+}
+
 void bind_ice(nb::module_& module) {
     nb::class_<IceMaterial> cls(
         module, "IceMaterial",
@@ -234,6 +337,7 @@ void bind_ice(nb::module_& module) {
         "refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.\n"
         "volume : how much of the light scattered once inside is traced, in [0, 1].\n"
         "anisotropy : g of that light, in [-0.95, 0.95].\n"
+        "density : Density, by which the medium is multiplied along refracted rays, from place to place.\n"
         "priority : where bodies overlap, the highest fills the place.\n"
         "overlays : list of Overlay, from below to the top; age : 0 = fresh .. 1 = old.\n"
         "tint : RGB factor on what leaves the core, or a TextureLookup.\n"
@@ -251,11 +355,11 @@ void bind_ice(nb::module_& module) {
         "__init__",
         [](IceMaterial* self, const Medium& medium, const std::string& profile, const FloatInput& roughness,
            float specular, float translucency, float refraction, const std::optional<float>& refraction_roughness,
-           float volume, float anisotropy, int priority, const std::vector<Overlay>& overlays, float age,
-           const ColorInput& tint, const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors,
-           bool ramp_preserve_energy, const std::string& compensation, float compensation_limit,
-           float compensation_strength, const FloatInput& spacing, const std::optional<TextureLookup>& normal,
-           const FloatInput& bump) {
+           float volume, float anisotropy, const Density& density, int priority, const std::vector<Overlay>& overlays,
+           float age, const ColorInput& tint, const std::vector<float>& ramp_distances,
+           const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy, const std::string& compensation,
+           float compensation_limit, float compensation_strength, const FloatInput& spacing,
+           const std::optional<TextureLookup>& normal, const FloatInput& bump) {
             IceMaterial model;
             model.medium = medium;
             model.roughness = to_input(roughness);
@@ -265,6 +369,7 @@ void bind_ice(nb::module_& module) {
             model.refraction_roughness = refraction_roughness.value_or(model.refraction_roughness);
             model.volume = volume;
             model.anisotropy = anisotropy;
+            model.density = density;
             model.priority = priority;
             model.overlays = overlays;
             model.age = age;
@@ -281,11 +386,12 @@ void bind_ice(nb::module_& module) {
         },
         "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f),
         "specular"_a = 1.0f, "translucency"_a = 1.0f, "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(),
-        "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "priority"_a = 0, "overlays"_a = std::vector<Overlay>(),
-        "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}), "ramp_distances"_a = std::vector<float>(),
-        "ramp_colors"_a = std::vector<Triple>(), "ramp_preserve_energy"_a = false, "compensation"_a = "depth",
-        "compensation_limit"_a = 8.0f, "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f),
-        "normal"_a = nb::none(), "bump"_a = FloatInput(0.0f));
+        "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "density"_a = Density(), "priority"_a = 0,
+        "overlays"_a = std::vector<Overlay>(), "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}),
+        "ramp_distances"_a = std::vector<float>(), "ramp_colors"_a = std::vector<Triple>(),
+        "ramp_preserve_energy"_a = false, "compensation"_a = "depth", "compensation_limit"_a = 8.0f,
+        "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f), "normal"_a = nb::none(),
+        "bump"_a = FloatInput(0.0f));
     def_input(cls, "roughness", &IceMaterial::roughness);
     def_input(cls, "tint", &IceMaterial::tint);
     def_input(cls, "bump", &IceMaterial::bump);
@@ -306,6 +412,7 @@ void bind_ice(nb::module_& module) {
             "value"_a.none())
         .def_rw("volume", &IceMaterial::volume)
         .def_rw("anisotropy", &IceMaterial::anisotropy)
+        .def_rw("density", &IceMaterial::density)
         .def_rw("priority", &IceMaterial::priority)
         .def_rw("overlays", &IceMaterial::overlays)
         .def_rw("age", &IceMaterial::age)
@@ -389,6 +496,7 @@ void bind_material(nb::module_& module) {
     bind_texture(module);
     bind_standard(module);
     bind_overlay(module);
+    bind_density(module);
     bind_ice(module);
     bind_displacement(module);
 }

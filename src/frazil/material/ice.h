@@ -8,6 +8,7 @@
 
 #include <vector>
 
+#include "frazil/material/density.h"
 #include "frazil/material/overlay.h"
 #include "frazil/material/texture.h"
 #include "frazil/translucency/compensation.h"
@@ -27,6 +28,7 @@ struct IceMaterial {
     float refraction_roughness = -1.0f;      // of light that goes through the boundary, 0..1; below 0 = as roughness
     float volume = 0.0f;                     // how much of the light scattered once is traced, 0..1
     float anisotropy = 0.0f;                 // g of the once-scattered light (Henyey-Greenstein)
+    Density density;                         // what the medium is multiplied by along refracted rays
     std::vector<Overlay> overlays;           // cracks, frost, snow ... from below to the top
     float age = 0.5f;                        // 0 = fresh .. 1 = old: how much of its opacity each overlay has
     int priority = 0;                        // where bodies overlap, the highest fills the place

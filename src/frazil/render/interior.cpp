@@ -105,7 +105,8 @@ Interiors::Interiors(const Scene& scene, const RayScene& ray_scene, const Surfac
       resolver_(resolver),
       bodies_(bodies),
       outward_(bodies.size(), 0.0f),
-      transmission_(bodies.size()) {
+      transmission_(bodies.size()),
+      densities_(bodies.size()) {
     std::map<std::uint32_t, Enclosure> of_mesh;
     std::map<float, std::shared_ptr<const TransmissionAlbedo>> of_eta;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -128,8 +129,21 @@ Interiors::Interiors(const Scene& scene, const RayScene& ray_scene, const Surfac
         auto& transmission = of_eta[ice.medium.eta];
         if (!transmission) transmission = std::make_shared<TransmissionAlbedo>(ice.medium.eta);
         transmission_[i] = transmission;
+        if (!ice.density.is_even()) {
+            densities_[i] = std::make_unique<DensityField>(ice.density, scene.objects[i].local_to_world.inverse(),
+                                                           resolver.world_to_rest(std::uint32_t(i)));
+        }
         is_empty_ = false;
     }
+}
+
+Interiors::Depth Interiors::depth(int body, const Ray& ray, float length) const {
+    length = std::min(length, kFarAway);
+    const DensityField* field = density(body);
+    if (!field) return {length, length};
+    const float depth = field->depth(ray.origin, ray.direction, length);
+    const float part = bodies_[std::size_t(body)]->material->density.absorption;
+    return {depth, (1.0f - part) * length + part * depth};
 }
 
 int Interiors::filling(const InsideOf& inside) const {
@@ -195,11 +209,12 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
         Hit hit;
         ++rays;
         const bool is_hit = ray_scene_.intersect(rest, hit);
-        const float length = std::min(is_hit ? hit.t : rest.t_max, kFarAway);
         const int body = filling(inside);
         if (body != InsideOf::kNone) {
             const Medium& medium = bodies_[std::size_t(body)]->material->medium;
-            result *= exp((medium.sigma_s_prime + (absorbs ? medium.sigma_a : Rgb(0.0f))) * -length);
+            const Depth through = depth(body, rest, is_hit ? hit.t : rest.t_max);
+            const Rgb absorbed = absorbs ? medium.sigma_a * through.absorption : Rgb(0.0f);
+            result *= exp(-(medium.sigma_s_prime * through.scattering + absorbed));
         }
         if (!is_hit) return result;
         if (!is_open_to_rays(hit.placement) || max_component(result) < kNothing) return Rgb(0.0f);

@@ -75,6 +75,14 @@ class Interiors {
     }
     const TransmissionAlbedo& transmission(int body) const { return *transmission_[std::size_t(body)]; }
 
+    // What of its medium a way through a body holds; `ray` of unit direction, from its origin.
+    struct Depth {
+        float scattering, absorption;  // metres
+    };
+    Depth depth(int body, const Ray& ray, float length) const;
+    // The body's density; null where it is that of its medium everywhere.
+    const DensityField* density(int body) const { return densities_[std::size_t(body)].get(); }
+
     // The part of the radiance (over squared index where the ray begins in ice) at the end of the ray that comes straight
     // through ice, without bending: Fresnel's transmittance, scattering and absorption, the narrowing of solid angles
     // where the ray leaves the ice that it begins in, 0 behind anything else. `absorbs` = false leaves absorption out.
@@ -90,6 +98,7 @@ class Interiors {
     const std::vector<std::unique_ptr<Body>>& bodies_;
     std::vector<float> outward_;  // +1 or -1 times the winding's normal points outwards; 0 = not entered
     std::vector<std::shared_ptr<const TransmissionAlbedo>> transmission_;  // by object
+    std::vector<std::unique_ptr<const DensityField>> densities_;           // by object
     std::vector<std::string> warnings_;
     bool is_empty_ = true;
 };

@@ -80,10 +80,9 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
 bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile& tile) const {
     const int body = interiors_.filling(path.inside);
     if (body == InsideOf::kNone) return true;
-    constexpr float kFarAway = 1e18f;
-    const float way = std::min(length, kFarAway);
+    const Interiors::Depth through = interiors_.depth(body, path.ray, length);
     const Medium& medium = bodies_[std::size_t(body)]->material->medium;
-    const Rgb unscattered = exp(medium.sigma_s_prime * -way) * path.clear;
+    const Rgb unscattered = exp(medium.sigma_s_prime * -through.scattering) * path.clear;
 
     Rgb once(0.0f);
     if (path.volume > 0.0f && path.inner < kMaxVolumePieces) {
@@ -99,7 +98,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
     }
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
-    path.scale(unscattered * exp(medium.sigma_a * -way));
+    path.scale(unscattered * exp(medium.sigma_a * -through.absorption));
     path.clear = path.core_share = 1.0f;
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});

@@ -19,7 +19,12 @@ bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& norma
     if (!ice.has_sheets()) return false;
     // Nothing is seen through so much ice.
     const Rgb sigma = ice.medium.sigma_s_prime + ice.medium.sigma_a;
-    const float reach = std::min(length, 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f));
+    const float deepest = 8.0f / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f);
+    const DensityField* density = interiors_.density(body);
+    const float reach = density && ice.density.absorption == 1.0f
+                            ? density->place(path.ray.origin, path.ray.direction, deepest, length)
+                        : density ? length
+                                  : std::min(length, deepest);
     const auto object = static_cast<std::uint32_t>(body);
     const V3f origin = path.ray.origin * resolver_.world_to_rest(object);
     V3f direction;

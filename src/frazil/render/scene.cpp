@@ -23,6 +23,7 @@ void check_material(const Material& material) {
     require(ice->anisotropy >= -0.95f && ice->anisotropy <= 0.95f, "anisotropy must be in -0.95..0.95",
             ice->anisotropy);
     require(ice->age >= 0.0f && ice->age <= 1.0f, "age must be in 0..1", ice->age);
+    check_density(ice->density, material.path);
     for (std::size_t i = 0; i < ice->overlays.size(); ++i) {
         check_overlay(ice->overlays[i], str(material.path, ": overlay ", i));
     }
