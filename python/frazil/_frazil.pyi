@@ -934,7 +934,7 @@ def point_occlusion(points: PointSet, *, distance: float = float('inf'), toleran
 
 def measure_bake(points: object, scene: RayScene, lights: Sequence[Light], samples: int, is_bare: bool) -> tuple[int, float]:
     """
-    (rays, seconds) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
+    (rays, seconds of processor time) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
     """
 
 class TextureTile:
