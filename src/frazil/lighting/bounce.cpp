@@ -10,12 +10,6 @@
 #include "frazil/lighting/places.h"
 
 namespace frazil {
-namespace {
-
-constexpr std::size_t kPointsPerBatch = 64;
-
-}  // namespace
-
 Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_t groups,
                        const BounceRadiance& radiance, const std::function<float(float)>& transmittance,
                        const IrradianceOptions& options, Progress* progress) {
@@ -34,18 +28,17 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     const ScrambledNet net(options.samples);
     std::atomic<std::uint64_t> dropped{0};
     std::atomic<std::size_t> done{0};
-    parallel_for(points.size(), kPointsPerBatch, [&](std::size_t begin, std::size_t end) {
+    parallel_for(points.size(), kPointsPerBounceBatch, [&](std::size_t begin, std::size_t end) {
         // Look around from every point of the batch.
         std::vector<V2f> u(net.size());
         std::vector<Place> places;
         std::vector<std::uint32_t> place_of(net.size());
         std::vector<BounceHit> hits;
-        std::vector<Place> starts;              // of each hit's ray
-        std::vector<V3f> centres(end - begin);  // of each point's rays
         for (std::size_t i = begin; i < end; ++i) {
             find_places(points, options.cells, std::uint32_t(i), places);
             net.draw(hash(options.seed, 0x626f756eU), std::uint32_t(i), u);
             deal(places, 0, hash(options.seed, std::uint32_t(i)), place_of);
+            const std::size_t first = hits.size();
             V3f sum(0.0f);
             for (std::size_t k = 0; k < u.size(); ++k) {
                 const Place& place = places[place_of[k]];
@@ -58,19 +51,20 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 const V3f origin = offset_origin(place.position, place.normal);
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.position = origin + hit.direction * hit.surface.t;
+                // Cosine-distributed rays leave pi T L / n.
+                hit.weight =
+                    kPi * transmittance(std::max(0.0f, hit.direction.dot(place.normal))) / float(options.samples);
+                hit.offset = place.position - places[0].position;
                 hits.push_back(hit);
-                starts.push_back(place);
             }
-            centres[i - begin] = places[0].position + sum / float(u.size());
+            for (std::size_t k = first; k < hits.size(); ++k) hits[k].offset -= sum / float(u.size());
         }
-        // Ask what the surfaces send, and let it in: cosine-distributed rays leave pi T L / n.
+        // Ask what the surfaces send, and let it in.
         std::vector<Rgb> sent(hits.size() * groups, Rgb(0.0f));
         radiance(hits, sent);
         for (std::size_t i = 0; i < hits.size(); ++i) {
-            const float cosine = std::max(0.0f, hits[i].direction.dot(starts[i].normal));
-            const float weight = kPi * transmittance(cosine) / float(options.samples);
             for (std::size_t g = 0; g < groups; ++g) {
-                const Rgb value = sent[i * groups + g] * weight;
+                const Rgb value = sent[i * groups + g] * hits[i].weight;
                 if (!is_finite(value)) {
                     ++dropped;
                     continue;
@@ -78,8 +72,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 const std::size_t at = hits[i].point * groups + g;
                 result.values[at] += value;
                 if (!result.moments.empty()) {
-                    result.moments[at] +=
-                        (starts[i].position - centres[hits[i].point - begin]) * (value.x + value.y + value.z);
+                    result.moments[at] += hits[i].offset * (value.x + value.y + value.z);
                 }
             }
         }

@@ -1,7 +1,8 @@
 // Light that reaches points by way of other surfaces: one bounce per call.
 // Model: E = ∫ L(x', -w) T(cos) cos dw over the directions in which a surface is seen, by cosine-distributed
 //   quasi-Monte Carlo rays; what the surface sends is the caller's: reflected_light() for opaque diffuse surfaces, a
-//   gather at the hit for ice (then ice lights ice). For n bounces call it n times, each with what the last one brought.
+//   gather at the hit for ice (then ice lights ice). Each hit tells its weight in the point's irradiance, so that a caller
+//   that keeps them can let light bounce again without another ray.
 // Units: W/m² for irradiance, W/m²/sr for radiance.
 // Valid: the same bits for any number of threads where the caller's function is one of its arguments alone.
 // Not: light straight from lights (irradiance.h), glossy surfaces.
@@ -19,11 +20,16 @@ struct BounceHit {
     std::uint32_t point = 0;  // index into the points
     V3f position;             // on the surface, metres
     V3f direction;            // from the point to the surface, unit length
+    float weight = 0.0f;      // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
+    V3f offset;               // metres: from the mean start of the point's rays to where this one starts
     Hit surface;
 };
 
-// Fill radiance[i * groups + g] with what hits[i] sends back along its ray, per light group. Called from several threads
-// at once, on batches whose cut does not depend on the number of threads.
+// Points whose hits make one batch: the first of a batch is a multiple of this.
+inline constexpr std::size_t kPointsPerBounceBatch = 256;
+
+// Fill radiance[i * groups + g] with what hits[i] sends back along its ray, per light group; 0 as they come. Called from
+// several threads at once, once for every batch of points, whose cut does not depend on the number of threads.
 using BounceRadiance = std::function<void(std::span<const BounceHit> hits, std::span<Rgb> radiance)>;
 
 // (N, groups) irradiance that surfaces send to the points. options.samples counts rays per point.

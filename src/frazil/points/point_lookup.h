@@ -1,10 +1,12 @@
 // The point that stands for a place on the surface: the nearest one on its side.
 // Model: a hashed grid with cells of the spacing; maximal points (poisson.h) leave no place farther than that from its point.
 // Units: metres.
-// Valid: thread-safe after construction; the points must outlive it. Ties go to the lower index.
+// Valid: thread-safe after construction. Ties go to the lower index.
 // Not: places off the surface.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,22 +18,63 @@ class PointLookup {
   public:
     static constexpr std::uint32_t kNone = ~std::uint32_t(0);
 
-    explicit PointLookup(const PointSet& points);
+    explicit PointLookup(const PointSet& points) : PointLookup(points, points.spacing) {}
+    // For visits as far as `reach`, metres.
+    PointLookup(const PointSet& points, double reach);
 
     // The index of the nearest point whose normal agrees with `normal`, else of the nearest of any normal; kNone where none
     // lies within two spacings.
     std::uint32_t nearest(const V3f& position, const V3f& normal) const;
 
+    // visit(index, position, normal), once for every point within reach and for some beyond.
+    template <class Visit>
+    void visit(const V3f& position, const Visit& visit) const;
+
   private:
-    std::int64_t cell(float coordinate, int axis) const;
+    struct Entry {
+        V3f position;
+        std::uint32_t index;  // of the point
+    };
+    // The cell of a place, and how far the next ones are.
+    struct At {
+        std::array<std::int64_t, 3> cell;
+        std::array<std::array<float, 3>, 3> beyond;  // per axis: to the cell before, itself, and after; cells², squared
+        float distance2(const std::array<std::uint8_t, 3>& neighbour) const {
+            return beyond[0][neighbour[0]] + beyond[1][neighbour[1]] + beyond[2][neighbour[2]];
+        }
+    };
+    // Of a cell, itself included, less one: the near ones first, so that few of the far ones need to be looked at.
+    static const std::array<std::array<std::uint8_t, 3>, 27> kNeighbours;
+    // Of squared distance, that rounding may take off.
+    static constexpr float kRoundoff = 1e-3f;
+
+    At locate(const V3f& position) const;
+    std::uint32_t bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const;
     std::uint32_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const;
 
-    const PointSet& points_;
     V3f origin_ = V3f(0.0f);
-    double inverse_size_ = 0.0;
+    double inverse_size_ = 0.0;  // of cells, 1/m
+    float size2_ = 0.0f;         // squared size, less what rounding may take off
     std::uint32_t mask_ = 0;
-    std::vector<std::uint32_t> first_;    // of each bucket in indices_; one more than buckets
-    std::vector<std::uint32_t> indices_;  // of the points, bucket by bucket
+    std::vector<std::uint32_t> first_;  // of each bucket in entries_; one more than buckets
+    std::vector<Entry> entries_;        // of the points, bucket by bucket
+    std::vector<V3f> normals_;          // in the same order
 };
+
+template <class Visit>
+void PointLookup::visit(const V3f& position, const Visit& visit) const {
+    const At at = locate(position);
+    std::array<std::uint32_t, 27> done;  // buckets that distant cells share are visited once
+    std::size_t count = 0;
+    for (const auto& neighbour : kNeighbours) {
+        if (at.distance2(neighbour) > 1.0f) continue;
+        const std::uint32_t b = bucket(at, neighbour);
+        if (std::find(done.begin(), done.begin() + count, b) != done.begin() + count) continue;
+        done[count++] = b;
+        for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
+            visit(entries_[k].index, entries_[k].position, normals_[k]);
+        }
+    }
+}
 
 }  // namespace frazil

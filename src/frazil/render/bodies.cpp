@@ -115,7 +115,8 @@ std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t objec
 }
 
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
+                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
+                 RenderStats& stats) {
     Stopwatch watch(stats.seconds["tree"]);
     const TranslucencySets sets(scene, ray_scene, bodies, lit);
     stats.warnings.insert(stats.warnings.end(), sets.warnings().begin(), sets.warnings().end());
@@ -126,6 +127,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (!sets.is_leader(i)) {
             bodies[i]->tree = bodies[sets.leader(i)]->tree;
             bodies[i]->thickness = bodies[sets.leader(i)]->thickness;
+            bodies[i]->at_points = bodies[sets.leader(i)]->at_points;
             continue;
         }
         const PointSet& points = sets.points(i);
@@ -141,6 +143,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             bodies[i]->thickness = make_thickness_tree(body, points, ray_scene, sets.shells(i));
         }
+        bodies[i]->at_points = PointGathers::make(body, points, plan);
         stats.points += bodies[i]->tree->point_count();
         stats.nodes += bodies[i]->tree->node_count();
     }

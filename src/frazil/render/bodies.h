@@ -13,6 +13,7 @@
 #include "frazil/lighting/irradiance.h"
 #include "frazil/material/microfacet.h"
 #include "frazil/render/options.h"
+#include "frazil/render/point_gathers.h"
 #include "frazil/render/scene.h"
 #include "frazil/render/shells.h"
 #include "frazil/render/surface.h"
@@ -31,7 +32,8 @@ struct Body {
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
-    float spacing = 0.0f;  // of its points
+    float spacing = 0.0f;                                     // of its points
+    std::shared_ptr<const PointGathers> at_points = nullptr;  // where a render has a use for them
 
     // What exitance is scaled by where W is `coverage`; `thin` is one of thickness_gains(), null without.
     Rgb gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const;
@@ -79,8 +81,10 @@ std::vector<Passage> passages_of(const Scene& scene);
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
-// use for it or a layer `wants_depth`. Fills points, nodes and seconds of the stats.
+// use for it or a layer `wants_depth`; and the gathers at its points, where the plan wants them. Fills points, nodes and
+// seconds of the stats.
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
+                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
+                 RenderStats& stats);
 
 }  // namespace frazil

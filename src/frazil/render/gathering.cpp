@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "frazil/base/random.h"
 
@@ -12,37 +13,75 @@ namespace {
 // shorter: exitance is linear over it within one or two thousandths.
 constexpr float kCell = 0.5f;
 
-// Gathers of one body: each place once, and which of them each request takes.
-struct Places {
-    std::vector<V3f> positions;
-    std::vector<std::uint32_t> of_request;
+constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
+
+// What the requests of one body are answered with, and which row each takes.
+struct Answers {
+    Gathered gathered;
+    std::vector<Rgb> thin;  // thickness_gains; empty where the body has none
+    std::vector<std::uint32_t> row_of;
 };
 
-Places shared_places(const GatherRequest* requests, std::size_t count, float cell) {
+// Each place that requests without a row ask for once.
+std::vector<V3f> shared_places(std::span<const GatherRequest> requests, float cell,
+                               std::vector<std::uint32_t>& row_of) {
     struct Key {
         std::uint64_t hash;
         std::uint32_t request;
     };
-    std::vector<Key> keys(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    std::vector<Key> keys;
+    for (std::uint32_t i = 0; i < requests.size(); ++i) {
+        if (row_of[i] != kNoRow) continue;
         const V3f at = requests[i].position / cell;
         const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
-        const std::uint32_t column = hash(bits(at.x), bits(at.y), bits(at.z));
-        keys[i] = {std::uint64_t(requests[i].pixel) << 32 | column, static_cast<std::uint32_t>(i)};
+        keys.push_back({std::uint64_t(requests[i].pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
     }
     std::sort(keys.begin(), keys.end(),
               [](const Key& a, const Key& b) { return a.hash != b.hash ? a.hash < b.hash : a.request < b.request; });
-    Places places;
-    places.of_request.resize(count);
-    for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
+    std::vector<V3f> places;
+    for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
         V3d sum(0.0);
-        for (end = begin; end < count && keys[end].hash == keys[begin].hash; ++end) {
+        for (end = begin; end < keys.size() && keys[end].hash == keys[begin].hash; ++end) {
             sum += V3d(requests[keys[end].request].position);
-            places.of_request[keys[end].request] = static_cast<std::uint32_t>(places.positions.size());
+            row_of[keys[end].request] = static_cast<std::uint32_t>(places.size());
         }
-        places.positions.emplace_back(sum / double(end - begin));
+        places.emplace_back(sum / double(end - begin));
     }
     return places;
+}
+
+template <class Value>
+void append(std::vector<Value>& values, const std::vector<Value>& more) {
+    values.insert(values.end(), more.begin(), more.end());
+}
+
+// Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest.
+// `places` are those that are gathered here: the first rows.
+Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options,
+                    std::vector<V3f>& places) {
+    Answers answers;
+    answers.row_of.assign(requests.size(), kNoRow);
+    Gathered blended;
+    std::vector<Rgb> blended_thin;
+    std::vector<std::uint32_t> is_blended;
+    for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
+        const GatherRequest& request = requests[i];
+        if (request.is_primary || request.normal == V3f(0.0f)) continue;
+        if (!body.at_points->append(request.position, request.normal, blended, blended_thin)) continue;
+        answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
+        is_blended.push_back(i);
+    }
+    const Medium& medium = body.material->medium;
+    const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
+    places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
+    answers.gathered = body.tree->gather(places.data(), places.size(), options);
+    answers.thin = thickness_gains(body.thickness.get(), places.data(), places.size(), options);
+    append(answers.gathered.exitance, blended.exitance);
+    append(answers.gathered.coverage, blended.coverage);
+    append(answers.gathered.layers, blended.layers);
+    append(answers.thin, blended_thin);
+    for (const std::uint32_t i : is_blended) answers.row_of[i] += static_cast<std::uint32_t>(places.size());
+    return answers;
 }
 
 }  // namespace
@@ -55,22 +94,18 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         const Body& body = *bodies_[tile.requests[begin].object];
         std::size_t end = begin;
         while (end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object) ++end;
-        const Medium& medium = body.material->medium;
-        const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
-        const auto [positions, place_of] =
-            shared_places(&tile.requests[begin], end - begin, kCell * std::min(body.spacing, mean_free_path));
-        tile.gathers += positions.size();
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
-        const Gathered gathered = body.tree->gather(positions.data(), positions.size(), with_layers);
+        std::vector<V3f> places;
+        const auto [gathered, thin, row_of] =
+            answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers, places);
+        tile.gathers += places.size();
         Gathered by_overlay;
-        if (body.overlay_tree) by_overlay = body.overlay_tree->gather(positions.data(), positions.size(), options);
-        const std::vector<Rgb> thin =
-            thickness_gains(body.thickness.get(), positions.data(), positions.size(), with_layers);
+        if (body.overlay_tree) by_overlay = body.overlay_tree->gather(places.data(), places.size(), options);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
-            const std::size_t row = place_of[i - begin];
+            const std::size_t row = row_of[i - begin];
             tile.subset = request.subset;
             const Rgb& coverage = gathered.coverage[row];
             const Compensation& compensation = body.material->compensation;

@@ -1,6 +1,7 @@
 // Answers to the gathers that paths ask for: what ice sends from a place, to the layers of the path that came there.
 // Model: a tile's requests are gathered body by body, compensated, and added to the tile by light group. What one pixel
 //   asks for at places so near to each other that the exitance is linear between them is gathered once, at their mean.
+//   Ice that is seen by way of other surfaces is answered from the gathers at its points (point_gathers.h).
 // Units: radiance.
 // Valid: thread-safe, one tile a thread; the order of requests decides the order of sums.
 // Not: which gathers are asked for (path_ice.cpp).

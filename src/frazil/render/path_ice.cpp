@@ -34,10 +34,11 @@ float lobe_spread(float alpha) {
 
 }  // namespace
 
-IceCore PathTracer::core_at(const Surface& surface, int body) const {
+IceCore PathTracer::core_at(const Surface& surface, int body, bool from_inside) const {
     IceCore core;
     core.body = body;
     core.position = surface.position;
+    core.normal = from_inside ? -surface.geometric_normal : surface.geometric_normal;
     core.radiance_per_exitance = bodies_[std::size_t(body)]->inner_radiance_per_exitance(surface);
     return core;
 }
@@ -114,17 +115,17 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         path.inside = crossing.beyond;
         path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ++path.straight;
-        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to);
+        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to, false);
         return true;
     }
     if (path.inner >= kMaxInnerBounces) {
-        request_gather(path, core_at(surface, crossing.from), Rgb(1.0f), tile);
+        request_gather(path, core_at(surface, crossing.from, true), Rgb(1.0f), tile);
         return false;
     }
     ++path.inner;
     // What lies on the boundary is seen from below as the core sees it.
     if (const float covered = surface.covering.covered; covered > kHiding) {
-        request_gather(path, core_at(surface, crossing.from), Rgb(covered), tile);
+        request_gather(path, core_at(surface, crossing.from, true), Rgb(covered), tile);
         path.scale(Rgb(1.0f - covered));
         if (covered >= 1.0f) return false;
     }
@@ -155,7 +156,9 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const int body = interiors_.filling(path.inside);
     path.spread += lobe_spread(alpha);
     path.add_blur(alpha);
-    if (body != InsideOf::kNone) path.begin_piece(core_at(surface, body), bodies_[std::size_t(body)]->material->volume);
+    if (body != InsideOf::kNone) {
+        path.begin_piece(core_at(surface, body, body == crossing.from), bodies_[std::size_t(body)]->material->volume);
+    }
     return true;
 }
 
@@ -178,6 +181,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.pixel = path.pixel;
     request.subset = tile.subset;
     request.position = core.position;
+    request.normal = core.normal;
     request.is_primary = core.is_primary;
     request.entering = core.entering;
     request.entering_group = core.entering_group;

@@ -83,6 +83,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
         IceCore core = path.core;
         core.is_primary = false;
         core.position = position;
+        core.normal = V3f(0.0f);
         request_gather(path, core, color, tile);
         return false;
     }
@@ -104,6 +105,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     IceCore core = path.core;
     core.is_primary = false;
     core.position = position;
+    core.normal = V3f(0.0f);
     path.begin_piece(core, bodies_[std::size_t(body)]->material->volume);
     return true;
 }

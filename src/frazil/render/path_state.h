@@ -52,6 +52,7 @@ struct Frame {
 struct IceCore {
     int body = InsideOf::kNone;
     V3f position = V3f(0.0f);
+    V3f normal = V3f(0.0f);                 // outwards; 0 where the position lies inside, not on the surface
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
     bool is_primary = false;                // seen by the camera itself
     bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there

@@ -22,6 +22,8 @@ namespace frazil {
 namespace {
 
 constexpr int kTileSize = 16;  // pixels along a side
+// Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
+constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
 // Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter.
 constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16;
 
@@ -215,7 +217,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const std::vector<std::string> groups = light_groups(scene.lights);
     std::optional<Openness> openness;
     const auto plant = [&](const std::vector<LitPoints>& lit) {
-        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), bodies, stats);
+        const double paths = double(options.width) * options.height * options.samples;
+        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
+                    {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats);
         if (layout.has("overlay")) plant_overlay_trees(scene, lit, groups.size(), bodies);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);

@@ -42,9 +42,9 @@ struct PrimaryHit {
 struct GatherRequest {
     std::uint32_t object = 0;
     std::uint32_t pixel = 0;
-    int subset = 0;           // of the pixel's samples
-    bool is_primary = false;  // seen by the camera itself
-    V3f position = V3f(0.0f);
+    int subset = 0;                                // of the pixel's samples
+    bool is_primary = false;                       // seen by the camera itself
+    V3f position = V3f(0.0f), normal = V3f(0.0f);  // as in IceCore
     // Radiance per exitance, by the layer that it goes to: the primary ice's is translucency, further light goes the way of
     // its first lobe.
     Rgb translucency = Rgb(0.0f), diffuse = Rgb(0.0f), specular = Rgb(0.0f), refraction = Rgb(0.0f);

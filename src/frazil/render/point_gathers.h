@@ -1,0 +1,48 @@
+// What ice sends from each of its points, gathered once, for places that the camera sees by way of other surfaces.
+// Model: such places are many and lie anywhere, so that no traversal serves several of them. Exitance varies over mean free
+//   paths, and points are nearer to each other than that: a mean of the points around a place, by a kernel as wide as one
+//   and a half spacings, comes within a few thousandths of a gather right there. Sums, coverage and layers are blended
+//   before anything is done with them, so that what is made of them stays linear in the light.
+// Units: as Gathered; metres.
+// Valid: thread-safe after construction.
+// Not: what the camera sees itself, which is gathered where it is seen.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "frazil/points/point_lookup.h"
+#include "frazil/translucency/point_tree.h"
+
+namespace frazil {
+
+struct Body;
+
+// Whether gathers at all points are worth their time and memory.
+struct PointGatherPlan {
+    double paths = 0.0;        // of the whole picture: more of them than points pay for the gathers
+    std::size_t bytes = 0;     // that are left for all bodies
+    GatherOptions gather;      // of the render
+    bool keeps_knots = false;  // gathers ask for ramp layers where a body has a ramp
+};
+
+class PointGathers {
+  public:
+    // Null where the plan has no use for it, or the points' spacing varies. Takes its memory off the plan's. The body has
+    // its trees already.
+    static std::shared_ptr<const PointGathers> make(const Body& body, const PointSet& points, PointGatherPlan& plan);
+
+    // Append to `gathered` and `thin` (thickness_gains; left empty where the body has none) the row of a place on the
+    // surface with this outward normal; false where no point is near.
+    bool append(const V3f& position, const V3f& normal, Gathered& gathered, std::vector<Rgb>& thin) const;
+
+  private:
+    PointGathers(const PointSet& points, float reach) : lookup_(points, reach), reach_(reach) {}
+
+    PointLookup lookup_;
+    float reach_;
+    Gathered at_points_;
+    std::vector<Rgb> thin_;
+};
+
+}  // namespace frazil

@@ -1,0 +1,102 @@
+#include <doctest/doctest.h>
+
+#include "frazil/points/poisson.h"
+#include "frazil/render/bodies.h"
+#include "frazil/render/point_gathers.h"
+#include "scenes.h"
+#include "shapes.h"
+
+namespace frazil {
+namespace {
+
+// A ball of ice, lit from one side, with its trees and points.
+struct LitBall {
+    Scene scene =
+        test::scene_of(test::sphere(1.0f, 4), test::ice(Rgb(0.1f, 0.3f, 1.0f), 1.31f, 0.2f, CompensationMode::depth));
+    PointSet points = poisson_points(scene.meshes[0], 0.025);  // half a mean free path
+    std::vector<std::unique_ptr<Body>> bodies;
+
+    explicit LitBall(const Ramp& ramp = {}) {
+        std::get<IceMaterial>(scene.materials[0].model).ramp = ramp;
+        std::vector<LitPoints> lit(1);
+        lit[0].points = points;
+        for (const V3f& n : points.normals) {
+            lit[0].irradiance.push_back(Rgb(std::max(0.0f, n.x), 0.2f, n.x > 0.0f ? 1.0f : 0.0f));
+        }
+        bodies = make_bodies(scene);
+        RenderStats stats;
+        const RayScene ray_scene(scene.meshes, {Placement{}});
+        plant_trees(scene, lit, 1, ray_scene, false, {}, bodies, stats);
+    }
+};
+
+PointGatherPlan plenty() {
+    PointGatherPlan plan;
+    plan.paths = 1e9;
+    plan.bytes = std::size_t(1) << 30;
+    plan.keeps_knots = true;
+    return plan;
+}
+
+double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+    double difference = 0.0, whole = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        difference += double((a[i] - b[i]).length2());
+        whole += double(b[i].length2());
+    }
+    return std::sqrt(difference / whole);
+}
+
+}  // namespace
+
+TEST_CASE("point gathers: a blend comes within some thousandths of a gather at the place") {
+    const LitBall ball(Ramp({0.0f, 0.1f, 0.3f}, {Rgb(1.0f), Rgb(0.5f), Rgb(2.0f)}));
+    PointGatherPlan plan = plenty();
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, plan);
+    REQUIRE(at_points);
+    CHECK(plan.bytes < plenty().bytes);
+    const PointSet places = poisson_points(ball.scene.meshes[0], 0.1, {7});
+    Gathered blended;
+    std::vector<Rgb> thin;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        REQUIRE(at_points->append(places.positions[i], places.normals[i], blended, thin));
+    }
+    GatherOptions options;
+    options.ramp_layers = true;
+    const Gathered there = ball.bodies[0]->tree->gather(places.positions.data(), places.size(), options);
+    const std::vector<Rgb> thin_there =
+        thickness_gains(ball.bodies[0]->thickness.get(), places.positions.data(), places.size(), options);
+    CHECK(relative_rms(blended.exitance, there.exitance) < 0.006);
+    CHECK(relative_rms(blended.coverage, there.coverage) < 0.005);
+    CHECK(relative_rms(blended.layers, there.layers) < 0.012);
+    CHECK(relative_rms(thin, thin_there) < 0.006);
+}
+
+TEST_CASE("point gathers: no rows off the surface or on its other side") {
+    const LitBall ball;
+    PointGatherPlan plan = plenty();
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, plan);
+    REQUIRE(at_points);
+    Gathered rows;
+    std::vector<Rgb> thin;
+    CHECK_FALSE(at_points->append(V3f(0.5f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows, thin));
+    CHECK_FALSE(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(-1.0f, 0.0f, 0.0f), rows, thin));
+    CHECK(rows.coverage.empty());
+    CHECK(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows, thin));
+    CHECK(rows.coverage.size() == 1);
+}
+
+TEST_CASE("point gathers: none where paths are few, memory is short or the spacing varies") {
+    const LitBall ball;
+    PointGatherPlan few = plenty(), tight = plenty(), plan = plenty();
+    few.paths = double(ball.points.size()) - 1.0;
+    tight.bytes = 1000;
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, few));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, tight));
+    CHECK(tight.bytes == 1000);
+    PointSet uneven = ball.points;
+    uneven.spacing *= 2.0;
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], uneven, plan));
+}
+
+}  // namespace frazil
