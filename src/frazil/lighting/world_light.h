@@ -114,7 +114,9 @@ class WorldLight {
     V2f image_place(const Rect& rect, const V3d& local_offset, const V3f& at) const;
     float image_pdf(const Rect& rect, const V2f& place, const V3f& to_light) const;
     // What shaping leaves of light that travels to the receiver against `direction`.
-    Rgb shaped(const V3f& direction) const { return eval(shaping_, -direction.dot(axis_)); }
+    Rgb shaped(const V3f& direction) const {
+        return eval(shaping_, {direction.dot(frame_[0]), direction.dot(frame_[1]), direction.dot(frame_[2])});
+    }
 
     void sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
     void sample_from(const Distant& distant, const V3f& position, std::span<const V2f> u,
@@ -141,7 +143,7 @@ class WorldLight {
     LightBounds bounds_;
     Shaping shaping_;
     bool is_shaped_ = false;
-    V3f axis_;  // of the shaping, the light's -z
+    V3f frame_[3];  // of the shaping: the light's axes, orthonormal; it shines along the last one's opposite
     std::variant<Dome, Distant, Rect, Disk, Sphere, Cylinder, MeshEmitter> shape_;
 };
 
