@@ -265,3 +265,17 @@ TEST_CASE("one and two threads give the same bits with overlays, sheets and volu
         CHECK(layer.pixels == two.layers.at(name).pixels);
     }
 }
+
+TEST_CASE("cells keep their mean cover under any footprint") {
+    Pattern pattern = pattern_of(PatternKind::cells);
+    pattern.size = 0.1f, pattern.width = 0.004f, pattern.feather = 0.001f, pattern.scales = 1, pattern.warp = 0.0f;
+    for (const float amount : {0.3f, 0.5f, 1.0f}) {
+        pattern.amount = amount;
+        const double fine = mean_mask(pattern, 1000, 0.0f);
+        for (const float footprint : {0.003f, 0.01f, 0.02f, 0.03f, 0.1f, 1.0f}) {
+            CAPTURE(footprint);
+            // Walls beside the nearest one go missing while cells are still told apart.
+            CHECK(mean_mask(pattern, 300, footprint) == doctest::Approx(fine).epsilon(0.15));
+        }
+    }
+}

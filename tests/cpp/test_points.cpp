@@ -1,6 +1,8 @@
 // The parts that Poisson points are made of, each against what it must give exactly.
 #include <doctest/doctest.h>
 
+#include <bit>
+
 #include "frazil/base/error.h"
 #include "frazil/base/random.h"
 #include "frazil/points/exact_shares.h"
@@ -36,12 +38,13 @@ double area_of_patches(const Mesh& mesh, const SpacingField& spacing, double til
             CHECK(patch.axes[0].cross(patch.axes[1]).dot(patch.normal) > 0.9999f);
             for (int k = 0; k < kMostCorners; ++k) {
                 CHECK(std::hypot(patch.x[k], patch.y[k]) <= patch.radius);
-                // Not farther out of the tile than the grid says.
+                // In the box that the grid tells.
                 const V3f corner = patch.center + patch.axes[0] * patch.x[k] + patch.axes[1] * patch.y[k];
-                const double overhang = grid.overhang / spacing.constant + 1e-4;
+                const TileFrame frame = grid.frame(tile, spacing.constant);
+                const V3d low = frame.to_local(grid.boxes[tile].min), high = frame.to_local(grid.boxes[tile].max);
                 for (int axis = 0; axis < 3; ++axis) {
-                    CHECK(corner[axis] >= -overhang);
-                    CHECK(corner[axis] <= grid.size / spacing.constant + overhang);
+                    CHECK(corner[axis] >= low[axis] - 1e-4);
+                    CHECK(corner[axis] <= high[axis] + 1e-4);
                 }
             }
         }
@@ -49,29 +52,29 @@ double area_of_patches(const Mesh& mesh, const SpacingField& spacing, double til
     return area;
 }
 
-// A patch and points around it, entered into a neighbourhood.
+// A patch and points around it, entered into a neighbourhood that reaches all of them.
 struct PatchAmongPoints {
     Mesh mesh = tilted_triangle();
     TileFrame frame = {V3d(0.0), 12.0, V3i(0), 1.0};
     Patch patch;
+    std::vector<Patch> patches;
     Neighbourhood near;
     Candidates candidates;
 
-    PatchAmongPoints(std::uint32_t seed, int count) {
+    PatchAmongPoints(std::uint32_t seed, int count, const std::vector<float>* spacing = nullptr) {
         mesh.positions = {{4.0f, 4.0f, 4.0f}, {6.2f, 4.5f, 4.1f}, {4.8f, 6.0f, 5.0f}};
-        std::vector<Patch> patches;
-        append_patches(mesh, {1.0, nullptr}, frame, 0, patches);
+        append_patches(mesh, {spacing ? 10.0 : 1.0, spacing}, frame, 0, patches);
         REQUIRE(patches.size() == 1);
         patch = patches[0];
-        near.reset(12.0, 3.0, 4.0);
-        const std::uint32_t cell = near.mark(patch.center);
+        patches[0].largest_spacing = 4.0f;
+        near.reset(patches, 0.0, kSameSideCosine);
         const auto random = [&] { return to_unit_float(hash(seed++)) * 4.0f - 2.0f; };
         for (int i = 0; i < count; ++i) {
             const V3f place =
                 patch.center + patch.axes[0] * random() + patch.axes[1] * random() + patch.normal * (0.1f * random());
             near.add(place, patch.normal, place);
         }
-        find_candidates(near, cell, patch, 4.0f, kSameSideCosine, candidates);
+        candidates = near.candidates(0);
     }
 
     V3f at(float x, float y) const { return patch.center + patch.axes[0] * x + patch.axes[1] * y; }
@@ -145,11 +148,12 @@ TEST_CASE("shares of a patch are what is nearest to each point, in floats and in
         CHECK(1.0 + gaps[0].excess == doctest::Approx(farthest).epsilon(0.02));
         CHECK(1.0 + gaps[0].excess >= farthest - 1e-5);
         CHECK(std::sqrt(1.0 + gap.excess2) == doctest::Approx(1.0 + gaps[0].excess).epsilon(1e-5));
+        CHECK(gap.open < 1e-5f);
+        if (gap.excess2 <= 0.0f) continue;
         const V3f there = scene.at(gap.corner.x, gap.corner.y);
         CHECK((scene.near.worlds[scene.nearest(there)] - there).length2() ==
               doctest::Approx(1.0 + gap.excess2).epsilon(1e-4));
         // A place further in is still as far from its point as the spacing.
-        if (gap.excess2 < 0.0f) continue;
         for (const float random : {0.0f, 0.3f, 0.999f}) {
             const V2f inside = gap.place(random);
             const V3f place = scene.at(inside.x, inside.y);
@@ -159,12 +163,71 @@ TEST_CASE("shares of a patch are what is nearest to each point, in floats and in
     }
 }
 
+TEST_CASE("where spacing varies, shares and the largest gap are those of doubles") {
+    const std::vector<float> spacing = {0.9f, 1.3f, 1.1f};
+    int gaps_found = 0;
+    for (std::uint32_t seed = 0; seed < 200; ++seed) {
+        PatchAmongPoints scene(seed * 1000, 1 + seed % 14, &spacing);
+        std::vector<Share> exact, quick;
+        std::vector<ExactGap> gaps;
+        Gap gap;
+        share_exactly(scene.patch, scene.frame, scene.candidates, scene.near.worlds, -1.0, exact, gaps);
+        REQUIRE(share_patch(scene.patch, scene.candidates, quick, gap));
+        std::vector<float> weights(scene.near.size(), 0.0f);
+        for (const Share& share : quick) weights[share.point] += share.weight;
+        for (const Share& share : exact) weights[share.point] -= share.weight;
+        for (const float weight : weights) CHECK(std::abs(weight) < 2e-5f);
+        // The exact one looks for the largest part of the spacing, the other for the largest difference of squares.
+        double most = -1e30;
+        for (const ExactGap& at : gaps) {
+            const V2f place(float(at.x), float(at.y));
+            const double local = scene.patch.center_spacing + scene.patch.spacing_slope.dot(place);
+            most = std::max(most, ((1.0 + at.excess) * (1.0 + at.excess) - 1.0) * local * local);
+        }
+        CHECK(gap.excess2 == doctest::Approx(most).epsilon(1e-4));
+        gaps_found += gap.excess2 > 0.0f;
+    }
+    CHECK(gaps_found > 50);
+}
+
+TEST_CASE("a sliver is shared out as in double, to its last part in a thousand") {
+    for (std::uint32_t seed = 0; seed < 300; ++seed) {
+        std::uint32_t state = seed * 1000;
+        const auto random = [&] { return to_unit_float(hash(state++)); };
+        const float height = std::pow(10.0f, -6.0f * random());
+        Mesh mesh;
+        mesh.positions = {{4.0f, 4.0f, 4.0f}, {6.5f, 4.0f, 4.0f}, {4.0f + 2.5f * random(), 4.0f + height, 4.0f}};
+        mesh.triangles = {{0, 1, 2}};
+        const TileFrame frame = {V3d(0.0), 12.0, V3i(0), 1.0};
+        std::vector<Patch> patches;
+        append_patches(mesh, {1.0, nullptr}, frame, 0, patches);
+        REQUIRE(patches.size() == 1);
+        Neighbourhood near;
+        near.reset(patches, 0.0, kSameSideCosine);
+        for (int i = 0; i < 5; ++i) {
+            const V3f place(3.5f + 3.5f * random(), 4.0f + height * random(), 4.0f);
+            near.add(place, patches[0].normal, place);
+        }
+        std::vector<Share> exact, quick;
+        std::vector<ExactGap> gaps;
+        Gap gap;
+        share_exactly(patches[0], frame, near.candidates(0), near.worlds, -1.0, exact, gaps);
+        if (!share_patch(patches[0], near.candidates(0), quick, gap)) continue;
+        std::vector<float> weights(near.size(), 0.0f);
+        float total = 0.0f;
+        for (const Share& share : quick) weights[share.point] += share.weight, total += share.weight;
+        for (const Share& share : exact) weights[share.point] -= share.weight;
+        CAPTURE(height);
+        for (const float weight : weights) CHECK(std::abs(weight) < 1e-3f * total);
+    }
+}
+
 TEST_CASE("cells are only covered where all of them is near a point, and darts only hit the patch where none is") {
     int hits = 0;
     for (std::uint32_t seed = 0; seed < 40; ++seed) {
         PatchAmongPoints scene(seed * 1000, 3);
         const Patch& patch = scene.patch;
-        const std::uint64_t cells = uncovered_cells(patch, scene.candidates, 0, ~std::uint64_t(0));
+        const std::uint64_t all = cells_of(patch), cells = uncovered_cells(patch, scene.candidates, 0, all);
         for (std::uint32_t k = 0; k < 400; ++k) {
             const float u = to_unit_float(hash(k, 1)), v = to_unit_float(hash(k, 2));
             const V2f place(patch.low.x + u * (patch.high.x - patch.low.x),
@@ -172,7 +235,12 @@ TEST_CASE("cells are only covered where all of them is near a point, and darts o
             const bool is_marked = cells >> (8 * int(v * 8) + int(u * 8)) & 1;
             const V3f there = scene.at(place.x, place.y);
             const float distance = (scene.near.worlds[scene.nearest(there)] - there).length();
-            if (!is_marked) CHECK(distance < 1.0f);
+            bool is_inside = true;
+            for (int e = 0; e < patch.count; ++e) {
+                const V2f a(patch.x[e], patch.y[e]), b(patch.x[(e + 1) % patch.count], patch.y[(e + 1) % patch.count]);
+                is_inside &= (b - a).cross(place - a) >= 0.0f;
+            }
+            if (!is_marked && is_inside) CHECK(distance < 1.0f);
         }
         RandomStream random{seed};
         int tries = 50;
@@ -188,39 +256,46 @@ TEST_CASE("cells are only covered where all of them is near a point, and darts o
         }
     }
     CHECK(hits > 100);
+    // The cells of a triangle are not all of its bounds.
+    CHECK(std::popcount(cells_of(PatchAmongPoints(0, 1).patch)) < 56);
 }
 
-TEST_CASE("a patch finds every point within reach on its side, and none on the other") {
-    Neighbourhood near;
-    near.reset(12.0, 1.6, 2.0);
-    std::uint32_t state = 1;
-    const auto random = [&] { return to_unit_float(hash(state++)) * 14.0f - 1.0f; };
-    std::vector<Patch> patches(200);
-    std::vector<std::uint32_t> cells;
-    for (Patch& patch : patches) {
-        patch.center = V3f(random(), random(), random());
-        patch.axes[0] = V3f(1, 0, 0);
-        patch.axes[1] = V3f(0, 1, 0);
-        patch.normal = V3f(0, 0, 1);
-        cells.push_back(near.mark(patch.center));
-    }
-    for (int i = 0; i < 2000; ++i) {
-        const V3f place(random(), random(), random());
-        near.add(place, V3f(0, 0, i % 2 ? 1.0f : -1.0f), place);
-    }
-    for (std::size_t look = 0; look < patches.size(); ++look) {
-        const V3f& center = patches[look].center;
-        std::size_t expected = 0;
-        for (std::size_t i = 1; i < near.size(); i += 2) expected += (near.worlds[i] - center).length2() < 3.9f;
-        Candidates found;
-        find_candidates(near, cells[look], patches[look], std::sqrt(3.9f), kSameSideCosine, found);
-        CHECK(found.count == int(expected));
-        for (int k = 0; k < found.count; ++k) {
-            CHECK(found.points[k] % 2 == 1);
-            const V3f d = near.worlds[found.points[k]] - center;
-            CHECK(found.x[k] == doctest::Approx(d.x));
-            CHECK(found.y[k] == doctest::Approx(d.y));
-            CHECK(found.s[k] == doctest::Approx(d.length2()));
+TEST_CASE("a patch has every point within its reach on its side, and none on the other") {
+    for (const std::size_t count : {1, 7, 200, 3000}) {
+        std::uint32_t state = 1;
+        const auto random = [&] { return to_unit_float(hash(state++)) * 14.0f - 1.0f; };
+        std::vector<Patch> patches(count);
+        for (Patch& patch : patches) {
+            patch.center = V3f(random(), random(), random());
+            patch.axes[0] = V3f(1, 0, 0);
+            patch.axes[1] = V3f(0, 1, 0);
+            patch.normal = V3f(0, 0, 1);
+            patch.radius = 0.5f + 0.05f * random();
+            patch.largest_spacing = 1.0f;
+        }
+        Neighbourhood near;
+        near.reset(patches, 0.0, kSameSideCosine);
+        for (int i = 0; i < 2000; ++i) {
+            const V3f place(random(), random(), random());
+            near.add(place, V3f(0, 0, i % 2 ? 1.0f : -1.0f), place);
+        }
+        for (std::size_t look = 0; look < count; look += 1 + count / 50) {
+            const Patch& patch = patches[look];
+            const float reach = reach_of(patch, 0.0);
+            CHECK(reach >= patch.radius + 1.0f);
+            const Candidates found = near.candidates(look);
+            std::vector<std::uint32_t> expected;
+            for (std::uint32_t i = 1; i < near.size(); i += 2) {
+                if ((near.worlds[i] - patch.center).length2() < reach * reach) expected.push_back(i);
+            }
+            REQUIRE(std::vector<std::uint32_t>(found.points, found.points + found.count) == expected);
+            CHECK(near.count(look) == expected.size());
+            for (int k = 0; k < found.count; ++k) {
+                const V3f d = near.worlds[found.points[k]] - patch.center;
+                CHECK(found.x[k] == doctest::Approx(d.x));
+                CHECK(found.y[k] == doctest::Approx(d.y));
+                CHECK(found.s[k] == doctest::Approx(d.length2()));
+            }
         }
     }
 }

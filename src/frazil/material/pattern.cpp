@@ -11,6 +11,10 @@ namespace {
 constexpr int kPlaneFamilies = 4;
 // Lines at a flat angle to the surface are widened no further than this.
 constexpr float kLeastSine = 0.25f;
+// Area of the walls between cells of unit size in a unit of volume, measured.
+constexpr float kWallArea = 2.85f;
+// Footprints over the size of cells from which their mean begins to count beside the nearest wall, and that see it alone.
+constexpr float kFirstMean = 0.05f, kAllMean = 0.3f;
 
 float smooth_step(float low, float high, float x) {
     const float t = std::clamp((x - low) / std::max(high - low, 1e-9f), 0.0f, 1.0f);
@@ -82,9 +86,31 @@ float fracture_mask(const Pattern& pattern, const PatternPoint& at) {
     return 1.0f - left;
 }
 
+// The mean of smooth_step(low, low + wide, u) over u in 0..1.
+float mean_step(float low, float wide) {
+    const auto sum = [&](float u) {  // from where the step begins
+        const float t = std::clamp((u - low) / wide, 0.0f, 1.0f);
+        return wide * t * t * t * (1.0f - 0.5f * t) + std::max(0.0f, u - low - wide);
+    };
+    return sum(1.0f) - sum(0.0f);
+}
+
+// What cell walls of one scale cover on average: their area in a unit of volume, cut by a surface.
+float mean_cells(const Pattern& pattern, float size, float width, bool on_surface) {
+    const float walls = kWallArea * (on_surface ? 0.25f * kPi : 1.0f) / size, sum = std::min(2.0f, walls * width);
+    return sum * (1.0f - 0.25f * sum) * mean_step(1.0f - pattern.amount - 0.2f, 0.4f);  // less where walls meet
+}
+
 float cells_mask(const Pattern& pattern, const PatternPoint& at) {
     float left = 1.0f, size = pattern.size, width = pattern.width, feather = pattern.feather;
     for (int scale = 0; scale < std::max(1, pattern.scales); ++scale) {
+        // A footprint as wide as the cells sees their mean.
+        const float mean = smooth_step(kFirstMean, kAllMean, at.footprint / size);
+        if (mean > 0.0f) left *= 1.0f - mean * mean_cells(pattern, size, width, at.normal != V3f(0.0f));
+        if (mean >= 1.0f) {
+            size /= 2.3f, width /= 1.7f, feather /= 1.7f;
+            continue;
+        }
         const std::uint32_t seed = pattern.seed + 101U * std::uint32_t(scale);
         V3f place = at.position / size;
         if (pattern.warp > 0.0f) {
@@ -103,7 +129,8 @@ float cells_mask(const Pattern& pattern, const PatternPoint& at) {
         if (line > 0.0f) {
             // Some walls are open cracks, some are closed.
             const float chance = to_unit_float(hash(wall.id, 5U));
-            left *= 1.0f - line * smooth_step(1.0f - pattern.amount - 0.2f, 1.0f - pattern.amount + 0.2f, chance);
+            const float open = smooth_step(1.0f - pattern.amount - 0.2f, 1.0f - pattern.amount + 0.2f, chance);
+            left *= 1.0f - (1.0f - mean) * line * open;
         }
         size /= 2.3f, width /= 1.7f, feather /= 1.7f;
     }

@@ -30,6 +30,16 @@ Corners corners_of(const Mesh& mesh, std::size_t triangle) {
     return c;
 }
 
+bool is_whole(const Corners& c, const Mesh& mesh, const SpacingField& spacing, std::size_t triangle) {
+    const V3i& t = mesh.triangles[triangle];
+    const double least = std::min(spacing.at_vertex(t.x), std::min(spacing.at_vertex(t.y), spacing.at_vertex(t.z)));
+    return c.edge2[c.longest] <= (kLongestEdge * kLongestEdge) * (least * least);
+}
+
+V3d cross_of(const Corners& c) {
+    return (c.position[1] - c.position[0]).cross(c.position[2] - c.position[0]);
+}
+
 V3d circle_center(const Corners& c) {
     const double a2 = c.edge2[1], b2 = c.edge2[2], c2 = c.edge2[0];  // opposite to corners 0, 1, 2
     const double longest2 = c.edge2[c.longest];
@@ -52,6 +62,7 @@ struct Plane {
     V3f normal;
     std::int32_t triangle;
     double unit;
+    double origin_spacing, spacing_slope[2];
 
     // The patch around the place (u, v).
     Patch patch(const PlanePolygon& polygon, double u, double v) const {
@@ -65,6 +76,8 @@ struct Plane {
         const V3d rounding = V3d(p.center) - exact;
         u += rounding.dot(axes[0]);
         v += rounding.dot(axes[1]);
+        p.center_spacing = static_cast<float>(origin_spacing + spacing_slope[0] * u + spacing_slope[1] * v);
+        p.spacing_slope = V2f(spacing_slope[0], spacing_slope[1]);
         p.low = V2f(1e30f);
         p.high = V2f(-1e30f);
         p.least_spacing = 1e30f;
@@ -162,29 +175,19 @@ V3f unit_normal(const Mesh& mesh, std::size_t triangle) {
     return V3f(unit_of(triangle_cross(mesh, triangle)));
 }
 
-double longest_edge(const Mesh& mesh, std::size_t triangle) {
+TriangleShape shape_of(const Mesh& mesh, const SpacingField& spacing, std::size_t triangle) {
     const Corners c = corners_of(mesh, triangle);
-    return std::sqrt(c.edge2[c.longest]);
-}
-
-V3d circle_center(const Mesh& mesh, std::size_t triangle) {
-    return circle_center(corners_of(mesh, triangle));
-}
-
-bool is_whole(const Mesh& mesh, const SpacingField& spacing, std::size_t triangle) {
-    const V3i& t = mesh.triangles[triangle];
-    const double least = std::min(spacing.at_vertex(t.x), std::min(spacing.at_vertex(t.y), spacing.at_vertex(t.z)));
-    return longest_edge(mesh, triangle) <= kLongestEdge * least;
+    return {cross_of(c) != V3d(0.0), is_whole(c, mesh, spacing, triangle), circle_center(c)};
 }
 
 void append_patches(const Mesh& mesh, const SpacingField& spacing, const TileFrame& frame, std::int32_t triangle,
                     std::vector<Patch>& patches) {
-    const V3d cross = triangle_cross(mesh, triangle), normal = unit_of(cross);
     const Corners c = corners_of(mesh, triangle);
+    const V3d normal = unit_of(cross_of(c));
     const int a = c.longest, b = (a + 1) % 3;
     const V3d along = unit_of(c.position[b] - c.position[a]);
-    const Plane plane = {
-        frame.to_local(c.position[a]), {along, normal.cross(along)}, V3f(normal), triangle, frame.unit};
+    Plane plane = {
+        frame.to_local(c.position[a]), {along, normal.cross(along)}, V3f(normal), triangle, frame.unit, 0.0, {}};
     PlanePolygon polygon;
     for (int k = 0; k < 3; ++k) {
         const int corner = (a + k) % 3;
@@ -192,7 +195,12 @@ void append_patches(const Mesh& mesh, const SpacingField& spacing, const TileFra
         polygon.push({from_first.dot(plane.axes[0]), k < 2 ? 0.0 : from_first.dot(plane.axes[1]),
                       spacing.at_vertex(mesh.triangles[triangle][corner]) / frame.unit});
     }
-    if (is_whole(mesh, spacing, triangle)) {
+    const PlanePlace* corner = polygon.vertices;
+    plane.origin_spacing = corner[0].spacing;
+    plane.spacing_slope[0] = (corner[1].spacing - corner[0].spacing) / corner[1].u;
+    plane.spacing_slope[1] =
+        (corner[2].spacing - corner[0].spacing - plane.spacing_slope[0] * corner[2].u) / corner[2].v;
+    if (is_whole(c, mesh, spacing, triangle)) {
         const V3d center = (circle_center(c) - c.position[a]) / frame.unit;
         patches.push_back(plane.patch(polygon, center.dot(plane.axes[0]), center.dot(plane.axes[1])));
     } else {

@@ -52,6 +52,8 @@ struct Patch {
     V3f center, axes[2], normal;
     float radius;  // no corner is farther from the centre
     float least_spacing, largest_spacing;
+    float center_spacing;  // spacing is center_spacing + spacing_slope · (x, y)
+    V2f spacing_slope;
     V2f low, high;  // what bounds x and y
     std::int32_t count;
     std::int32_t triangle;
@@ -62,9 +64,7 @@ struct Patch {
 inline constexpr double kLongestEdge = 3.0;
 inline constexpr double kPatchWidth = 2.5;
 
-// How far a patch reaches from the place that its tile holds, at most: beside the longest edge of a whole triangle, beside the (largest)
-// spacing for a part.
-inline constexpr double kWholeReach = 0.58;
+// How far a part of a larger triangle reaches from the place that its tile holds, at most, in (largest) spacings.
 inline constexpr double kPartReach = 2.5;
 
 // A place rounded to what is stored. Out of line: GCC 12 drops the rounding of two coordinates at a time where it sees
@@ -74,12 +74,12 @@ inline constexpr double kPartReach = 2.5;
 // The unit normal of a triangle, evaluated in double; zero where the triangle has no area.
 V3f unit_normal(const Mesh& mesh, std::size_t triangle);
 
-// The length of the longest edge, metres, and whether the triangle stays whole.
-double longest_edge(const Mesh& mesh, std::size_t triangle);
-bool is_whole(const Mesh& mesh, const SpacingField& spacing, std::size_t triangle);
-
-// The centre of a triangle's smallest circle, metres: that of the patch which the whole triangle is.
-V3d circle_center(const Mesh& mesh, std::size_t triangle);
+struct TriangleShape {
+    bool has_area;
+    bool is_whole;  // one patch
+    V3d center;     // of its smallest circle, metres: that of the patch which the whole triangle is
+};
+TriangleShape shape_of(const Mesh& mesh, const SpacingField& spacing, std::size_t triangle);
 
 // Append the patches of `triangle` that belong to the tile. A whole triangle is taken as it is: only its own tile asks.
 void append_patches(const Mesh& mesh, const SpacingField& spacing, const TileFrame& frame, std::int32_t triangle,

@@ -1,12 +1,13 @@
-// What is done most with a patch and the points near it: find them, throw darts, share the patch out. Eight numbers at a
+// What is done most with a patch and the points near it: throw darts, share the patch out. Eight numbers at a
 // time, for the processor that it runs on.
 // Model: in the plane of a patch a point p counts by its projection (x, y) and its squared distance s from the patch's
-//   centre, as |z - p|² = |z|² + s - 2 z·p for all z in the plane. So the bisector of two points is a line, and the part of the
-//   patch nearest to p is the patch cut by one line per other point. Where spacing is linear, the gap from a part to its
-//   point is largest at a corner of the part.
+//   centre, as |z - p|² = |z|² + s - 2 z·p for all z in the plane. So the points that are as near as p and as q lie on a line,
+//   and what of it is in the patch and not nearer to a third point is the edge between the shares of p and q: all such
+//   lines are cut at once, lane by lane. Edges give areas by their line integrals. Where spacing is linear, the gap from a share to
+//   its point is largest at a corner.
 // Units: the tile's own (see TileFrame).
-// Valid: float precision, about 1e-6 spacings; the same bits on every processor. share_patch gives up (returns false) where a
-//   part has more than eight corners or rounding has bent it; exact_shares.h does those.
+// Valid: float precision, about 1e-6 spacings; the same bits on every processor. share_patch gives up (returns false) where
+//   there are very many points or rounding leaves a share open; exact_shares.h does those.
 // Not: placing points.
 #pragma once
 
@@ -14,7 +15,6 @@
 #include <string>
 #include <vector>
 
-#include "frazil/points/neighbourhood.h"
 #include "frazil/points/patch.h"
 
 namespace frazil {
@@ -35,14 +35,12 @@ struct RandomStream {
     float next_float() { return static_cast<float>(next() >> 40) * 0x1p-24f; }
 };
 
-// The points that can matter to a patch, on its side. After the last there is room for a whole group of lanes.
+// The points that can matter to a patch, on its side: their places in its plane, and their squared distances from its
+// centre. After the last there is room to read a whole group of lanes.
 struct Candidates {
-    std::vector<float> x, y, s;
-    std::vector<std::uint32_t> points;
-    int count = 0;
-
-    void reserve(std::size_t capacity);
-    void add(float px, float py, float ps, std::uint32_t point);
+    const float *x, *y, *s;
+    const std::uint32_t* points;
+    int count;
 };
 
 // A part of a patch that is nearest to one point.
@@ -57,19 +55,17 @@ struct Gap {
     float excess2 = -1e30f;
     V2f point = V2f(0.0f);   // whose share it is
     V2f middle = V2f(0.0f);  // of the share's corners
+    float open = 0.0f;       // by how much rounding has moved corners, at most
 
     // A place of the share, from the corner to the middle, that is farther from the point than the spacing was at the
     // corner; `random` in [0, 1) says how far in.
     V2f place(float random) const;
 };
 
-// The points of a cell that lie within `reach` of the patch's centre and whose normals make a cosine above `least_cosine`
-// with its own.
-void find_candidates(const Neighbourhood& near, std::uint32_t cell, const Patch& patch, float reach, float least_cosine,
-                     Candidates& candidates);
+// A bit for each cell of an 8 x 8 grid over the patch's bounds that the patch may touch.
+std::uint64_t cells_of(const Patch& patch);
 
-// A bit for each cell of an 8 x 8 grid over the patch's bounds, without those of `cells` that lie in the ball of one of the
-// candidates from `first` on.
+// The cells of `cells` without those that lie in the ball of one of the candidates from `first` on.
 std::uint64_t uncovered_cells(const Patch& patch, const Candidates& candidates, int first, std::uint64_t cells);
 
 // Throw up to `tries` darts (which are counted down) into the marked cells, evenly, until one hits the patch where no
@@ -77,7 +73,8 @@ std::uint64_t uncovered_cells(const Patch& patch, const Candidates& candidates, 
 bool throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
                  int& tries, V2f& hit);
 
-// Share the patch among the points nearest to it. Sorts the candidates, nearest to the centre first. False where it gave up.
-bool share_patch(const Patch& patch, Candidates& candidates, std::vector<Share>& shares, Gap& gap);
+// Share the patch among the points nearest to it. False where it gave up. Of `gap` all but excess2 and open are set only
+// where excess2 > 0.
+bool share_patch(const Patch& patch, const Candidates& candidates, std::vector<Share>& shares, Gap& gap);
 
 }  // namespace frazil

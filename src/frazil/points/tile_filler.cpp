@@ -1,6 +1,7 @@
 #include "frazil/points/tile_filler.h"
 
 #include <atomic>
+#include <bit>
 
 #include "frazil/base/random.h"
 #include "frazil/points/side.h"
@@ -9,11 +10,9 @@ namespace frazil {
 namespace {
 
 constexpr double kEvenDarts = 2.0;      // per spacing² of surface, over the whole tile in random order
-constexpr int kMostMisses = 8;          // of darts into the gaps of a patch, until they are left to the shares
+constexpr int kMostMisses = 5;          // of darts into the gaps of a patch, until they are left to the shares
 constexpr int kCoarseTries = 256;       // of darts into a gap where floats are coarse
 constexpr double kGapTolerance = 1e-9;  // of the spacing
-constexpr double kCellWidth = 1.0;      // of the cells of points, beside the reach of look-ups
-constexpr float kReachSlack = 1.0f + 1e-4f;
 
 // The float that many floats above.
 float stepped(float x, int steps) {
@@ -35,40 +34,56 @@ void TileFiller::begin(std::size_t tile) {
         farthest = std::max(farthest, std::max(std::abs(origin[axis]), std::abs(origin[axis] + grid.size)));
     }
     rounding_ = farthest * 0x1p-21 / points_.unit;
-    patches_.clear();
-    for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
-        append_patches(points_.mesh, points_.spacing, frame_, grid.triangles[i], patches_);
+    later_.clear();
+    for (const TileGrid::Neighbour& other : around_) {
+        if (grid.colour(other.tile) < grid.colour(tile)) continue;
+        const Box3f& box = grid.boxes[other.tile];
+        later_.push_back({V3f(frame_.to_local(box.min)), V3f(frame_.to_local(box.max))});
     }
+    patches_.clear();
 }
 
 // Make the lists in which patches find the points around them.
 void TileFiller::prepare_neighbourhood() {
-    float reach = 0.0f;
-    for (const Patch& patch : patches_) reach = std::max(reach, patch.radius + patch.largest_spacing);
-    reach = reach * kReachSlack * kReachSlack + float(rounding_);
-    near_.reset(frame_.size(), kCellWidth * reach, reach);
+    near_.reset(patches_, rounding_, least_cosine(points_.thin_walls));
     entered_.clear();
     placed_.clear();
-    states_.clear();
-    for (const Patch& patch : patches_) states_.push_back({near_.mark(patch.center), 0, 0, 0, 0});
 }
 
-void TileFiller::enter(std::vector<Dart>& darts) {
-    for (Dart& dart : darts) {
-        const V3f local(frame_.to_local(dart.position));
-        if (near_.is_in_reach(local)) {
-            near_.add(local, dart.normal, dart.position);
-            entered_.push_back(&dart);
-        }
+// Enter the points of a tile that can matter.
+void TileFiller::enter(std::size_t tile) {
+    Box3f box;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double origin = frame_.origin()[axis], unit = frame_.unit;
+        box.min[axis] = std::nextafter(float(near_.box_in_reach().min[axis] * unit + origin), -HUGE_VALF);
+        box.max[axis] = std::nextafter(float(near_.box_in_reach().max[axis] * unit + origin), HUGE_VALF);
+    }
+    for (Dart& dart : points_.darts[tile]) {
+        if (!box.intersects(dart.position)) continue;
+        near_.add(V3f(frame_.to_local(dart.position)), dart.normal, dart.position);
+        entered_.push_back(&dart);
     }
 }
 
 void TileFiller::fill(std::size_t tile) {
     begin(tile);
+    const TileGrid& grid = points_.grid;
+    for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
+        append_patches(points_.mesh, points_.spacing, frame_, grid.triangles[i], patches_);
+    }
+    if (patches_.empty()) return;
+    states_.clear();
+    std::vector<std::int32_t>& border = points_.borders[tile];
+    for (const Patch& patch : patches_) {
+        states_.push_back({0, 0, 0, 0, 0, points_.with_areas && is_final(patch)});
+        if (!states_.back().is_final && (border.empty() || border.back() != patch.triangle)) {
+            border.push_back(patch.triangle);
+        }
+    }
     prepare_neighbourhood();
-    for (const TileGrid::Neighbour& other : around_) enter(points_.darts[other.tile]);
+    for (const TileGrid::Neighbour& other : around_) enter(other.tile);
 
-    const std::uint64_t key = points_.grid.keys[tile];
+    const std::uint64_t key = grid.keys[tile];
     random_ = {(std::uint64_t(points_.seed) << 32 | hash(points_.seed, std::uint32_t(key >> 32))) ^ key};
     random_.next();
     order_.resize(patches_.size());
@@ -88,25 +103,26 @@ void TileFiller::fill(std::size_t tile) {
     quanta_.assign(near_.size(), 0);
     for (std::size_t i = 0; i < patches_.size(); ++i) {
         const PatchState& state = states_[i];
-        if (is_final(patches_[i])) add_areas(patches_[i], &all_shares_[state.first_share], state.share_count);
+        if (state.is_final) add_areas(patches_[i], &all_shares_[state.first_share], state.share_count);
     }
     flush_areas();
 }
 
 void TileFiller::share_border(std::size_t tile) {
+    std::vector<std::int32_t> border;
+    border.swap(points_.borders[tile]);
+    if (border.empty()) return;
     begin(tile);
-    std::size_t left = 0;
-    for (const Patch& patch : patches_) {
-        if (!is_final(patch)) patches_[left++] = patch;
+    for (const std::int32_t triangle : border) {
+        append_patches(points_.mesh, points_.spacing, frame_, triangle, patches_);
     }
-    patches_.resize(left);
-    if (left == 0) return;
+    if (points_.with_areas) std::erase_if(patches_, [&](const Patch& patch) { return is_final(patch); });
+    if (patches_.empty()) return;
     prepare_neighbourhood();
-    enter(points_.darts[tile]);
-    for (const TileGrid::Neighbour& other : around_) enter(points_.darts[other.tile]);
+    enter(tile);
+    for (const TileGrid::Neighbour& other : around_) enter(other.tile);
     quanta_.assign(near_.size(), 0);
     for (std::size_t i = 0; i < patches_.size(); ++i) {
-        find(i);
         share(i);
         add_areas(patches_[i], shares_.data(), shares_.size());
     }
@@ -115,42 +131,32 @@ void TileFiller::share_border(std::size_t tile) {
 
 // Whether no tile that is filled later can put a point nearer to the patch than its own are.
 bool TileFiller::is_final(const Patch& patch) const {
-    const double size = frame_.size(), overhang = points_.grid.overhang / points_.unit;
-    const double reach = patch.radius + patch.largest_spacing * kReachSlack + rounding_ + overhang;
-    const int colour = points_.grid.colour(tile_);
-    for (const TileGrid::Neighbour& other : around_) {
-        if (points_.grid.colour(other.tile) < colour) continue;
-        double gap2 = 0.0;
+    const float reach = reach_of(patch, rounding_);
+    for (const Box3f& box : later_) {
+        float gap2 = 0.0f;
         for (int axis = 0; axis < 3; ++axis) {
-            const double to_wall = other.offset[axis] > 0   ? size - patch.center[axis]
-                                   : other.offset[axis] < 0 ? double(patch.center[axis])
-                                                            : 0.0;
-            gap2 += to_wall > 0.0 ? to_wall * to_wall : 0.0;
+            const float at = patch.center[axis];
+            const float gap = std::max(0.0f, std::max(box.min[axis] - at, at - box.max[axis]));
+            gap2 += gap * gap;
         }
         if (gap2 <= reach * reach) return false;
     }
     return true;
 }
 
-void TileFiller::find(std::size_t i) {
-    const Patch& patch = patches_[i];
-    find_candidates(near_, states_[i].cell, patch,
-                    (patch.radius + patch.largest_spacing * kReachSlack) * kReachSlack + float(rounding_),
-                    least_cosine(points_.thin_walls), candidates_);
-}
-
 // Throw darts evenly over the tile: most points come from here.
 void TileFiller::throw_evenly(double density) {
     for (const std::uint32_t i : order_) {
         const Patch& patch = patches_[i];
+        PatchState& state = states_[i];
+        state.cells = cells_of(patch);
         const V2f extent = patch.high - patch.low;
         const float spacing = 0.5f * (patch.least_spacing + patch.largest_spacing);
-        int tries = int(float(density) * extent.x * extent.y / (spacing * spacing) + random_.next_float());
-        if (tries == 0) continue;
-        find(i);
+        const float area = extent.x * extent.y * (float(std::popcount(state.cells)) / 64.0f);
+        int tries = int(float(density) * area / (spacing * spacing) + random_.next_float());
         V2f hit;
-        while (throw_darts(patch, candidates_, ~std::uint64_t(0), random_, tries, hit)) {
-            place(patch, hit.x, hit.y, 0);
+        while (throw_darts(patch, near_.candidates(i), state.cells, random_, tries, hit)) {
+            place(i, hit.x, hit.y, 0);
         }
     }
 }
@@ -159,79 +165,84 @@ void TileFiller::throw_evenly(double density) {
 void TileFiller::throw_into_gaps() {
     for (const std::uint32_t i : order_) {
         const Patch& patch = patches_[i];
-        find(i);
-        std::uint64_t cells = uncovered_cells(patch, candidates_, 0, ~std::uint64_t(0));
+        PatchState& state = states_[i];
         int tries = kMostMisses;
         V2f hit;
-        while (cells != 0 && throw_darts(patch, candidates_, cells, random_, tries, hit)) {
-            const int known = candidates_.count;
-            if (place(patch, hit.x, hit.y, 0)) {
-                cells = uncovered_cells(patch, candidates_, known, cells);
-                tries = kMostMisses;
-            }
+        take_covered(i);
+        while (state.cells != 0 && throw_darts(patch, near_.candidates(i), state.cells, random_, tries, hit)) {
+            if (!place(i, hit.x, hit.y, 0)) continue;
+            take_covered(i);
+            tries = kMostMisses;
         }
     }
+}
+
+// Take the cells from a patch that points have covered since it was looked at.
+void TileFiller::take_covered(std::size_t i) {
+    PatchState& state = states_[i];
+    state.cells = uncovered_cells(patches_[i], near_.candidates(i), int(state.known), state.cells);
+    state.known = near_.count(i);
 }
 
 // Share a patch out, with points where it has gaps.
 void TileFiller::cover(std::size_t i) {
     const Patch& patch = patches_[i];
-    find(i);
+    take_covered(i);
+    if (states_[i].cells == 0) return;
     const float band = 4.0f * kDistanceError * patch.largest_spacing * patch.largest_spacing;
     while (true) {
         Gap gap;
-        if (share_patch(patch, candidates_, shares_, gap)) {
-            if (candidates_.count > 0 && gap.excess2 < -band) break;
+        if (share_patch(patch, near_.candidates(i), shares_, gap)) {
+            const float least_band = band + 2.0f * patch.largest_spacing * gap.open;
+            if (near_.count(i) > 0 && gap.excess2 < -least_band) break;
             if (gap.excess2 > band) {
                 const V2f inside = gap.place(random_.next_float());
-                if (place(patch, inside.x, inside.y, 0)) continue;
-                if (place(patch, gap.corner.x, gap.corner.y, 0)) continue;
+                if (place(i, inside.x, inside.y, 0)) continue;
+                if (place(i, gap.corner.x, gap.corner.y, 0)) continue;
             }
         }
-        share_exactly(patch, frame_, candidates_, near_.worlds, kGapTolerance, shares_, gaps_);
+        share_exactly(patch, frame_, near_.candidates(i), near_.worlds, kGapTolerance, shares_, gaps_);
         if (gaps_.empty()) break;
         const bool is_placed =
-            std::any_of(gaps_.begin(), gaps_.end(), [&](const ExactGap& at) { return place(patch, at.x, at.y, 1); });
+            std::any_of(gaps_.begin(), gaps_.end(), [&](const ExactGap& at) { return place(i, at.x, at.y, 1); });
         // Where floats are too coarse to place a point in it, the gap stays.
-        if (!is_placed && !place_somewhere(patch)) break;
+        if (!is_placed && !place_somewhere(i)) break;
     }
     keep_shares(i);
 }
 
 // Try many places of a patch, each with the floats around it.
-bool TileFiller::place_somewhere(const Patch& patch) {
+bool TileFiller::place_somewhere(std::size_t i) {
+    const Patch& patch = patches_[i];
+    const Candidates near = near_.candidates(i);
+    const std::uint64_t cells = uncovered_cells(patch, near, 0, cells_of(patch));
     int tries = kCoarseTries;
     V2f hit;
-    while (throw_darts(patch, candidates_, uncovered_cells(patch, candidates_, 0, ~std::uint64_t(0)), random_, tries,
-                       hit)) {
-        if (place(patch, hit.x, hit.y, 2)) return true;
+    while (throw_darts(patch, near, cells, random_, tries, hit)) {
+        if (place(i, hit.x, hit.y, 2)) return true;
     }
     return false;
 }
 
-// Share a patch out once more if points came near it after its turn.
+// Share a covered patch out, if that was not done with the points that are near it now.
 void TileFiller::share_again(std::size_t i) {
-    PatchState& state = states_[i];
-    if (near_.count(state.cell) == state.cell_count) return;
-    find(i);
-    bool is_same = true;
-    for (int k = 0; k < candidates_.count; ++k) is_same &= candidates_.points[k] < state.point_count;
-    if (is_same) return;
+    const PatchState& state = states_[i];
+    if (!state.is_final || near_.count(i) == state.shared_count) return;
     share(i);
     keep_shares(i);
 }
 
 void TileFiller::share(std::size_t i) {
     Gap gap;
-    if (!share_patch(patches_[i], candidates_, shares_, gap)) {
-        share_exactly(patches_[i], frame_, candidates_, near_.worlds, kGapTolerance, shares_, gaps_);
+    if (!share_patch(patches_[i], near_.candidates(i), shares_, gap)) {
+        share_exactly(patches_[i], frame_, near_.candidates(i), near_.worlds, kGapTolerance, shares_, gaps_);
     }
 }
 
 void TileFiller::keep_shares(std::size_t i) {
     PatchState& state = states_[i];
-    state.cell_count = near_.count(state.cell);
-    state.point_count = static_cast<std::uint32_t>(near_.size());
+    if (!state.is_final) return;
+    state.shared_count = near_.count(i);
     state.first_share = static_cast<std::uint32_t>(all_shares_.size());
     state.share_count = static_cast<std::uint32_t>(shares_.size());
     all_shares_.insert(all_shares_.end(), shares_.begin(), shares_.end());
@@ -267,7 +278,9 @@ void TileFiller::flush_areas() {
 
 // Place a point at (x, y) of the patch if it is still free once rounded to what is stored. The floats up
 // to `most_steps` from it are tried as well, so that a gap is closed even where floats are coarse.
-bool TileFiller::place(const Patch& patch, double x, double y, int most_steps) {
+bool TileFiller::place(std::size_t i, double x, double y, int most_steps) {
+    const Patch& patch = patches_[i];
+    const Candidates near = near_.candidates(i);
     // The nearest place of the triangle.
     const V3d local = V3d(patch.center) + V3d(patch.axes[0]) * x + V3d(patch.axes[1]) * y;
     const V3i& t = points_.mesh.triangles[patch.triangle];
@@ -285,7 +298,7 @@ bool TileFiller::place(const Patch& patch, double x, double y, int most_steps) {
 
     V3f world = to_stored(place);
     const auto is_free_at = [&](const V3f& at) {
-        return is_free(at, x, y, (frame_.to_local(at) - local).length(), spacing);
+        return is_free(near, at, x, y, (frame_.to_local(at) - local).length(), spacing);
     };
     if (!is_free_at(world)) {
         if (most_steps == 0) return false;
@@ -304,16 +317,14 @@ bool TileFiller::place(const Patch& patch, double x, double y, int most_steps) {
     V2f uv{float(u), float(v)};
     if (double(uv.x) + uv.y > 1.0) uv.x = std::nextafter(1.0f - uv.y, 0.0f);
     const V3f stored(frame_.to_local(world));
-    const std::uint32_t point = near_.add(stored, patch.normal, world);
-    const V3f d = stored - patch.center;
-    candidates_.add(d.dot(patch.axes[0]), d.dot(patch.axes[1]), d.length2(), point);
+    near_.add(stored, patch.normal, world);
     placed_.push_back({world, patch.normal, patch.triangle, uv, 0});
     return true;
 }
 
 // Whether no candidate is nearer than the spacing, metres, to a place that is stored `shift` from (x, y).
-bool TileFiller::is_free(const V3f& world, double x, double y, double shift, double spacing) const {
-    const Candidates& c = candidates_;
+bool TileFiller::is_free(const Candidates& c, const V3f& world, double x, double y, double shift,
+                         double spacing) const {
     const auto seen = float(spacing / frame_.unit * (1.0 + kDistanceError) + shift);
     const auto near_x = float(x), near_y = float(y);
     const float limit = seen * seen - (near_x * near_x + near_y * near_y);

@@ -36,8 +36,10 @@ struct PointsInTiles {
     std::uint32_t seed;
     double unit;          // the reference spacing, metres
     double area_quantum;  // m²
+    bool with_areas;      // as soon as they are known; else all patches wait as those at borders do
     TileGrid grid;
     std::vector<std::vector<Dart>> darts;
+    std::vector<std::vector<std::int32_t>> borders;  // triangles with patches that wait for later tiles
 };
 
 class TileFiller {
@@ -52,28 +54,29 @@ class TileFiller {
 
   private:
     struct PatchState {
-        std::uint32_t cell;         // of the neighbourhood
-        std::uint32_t cell_count;   // of its points when the patch was shared out
-        std::uint32_t point_count;  // likewise, of all
+        std::uint64_t cells;  // those that the first `known` points of its list do not cover
+        std::uint32_t known;
+        std::uint32_t shared_count;  // of its list when it was shared out
         std::uint32_t first_share, share_count;
+        bool is_final;  // no tile that is filled later can change it
     };
 
     void begin(std::size_t tile);
     void prepare_neighbourhood();
-    void enter(std::vector<Dart>& darts);
+    void enter(std::size_t tile);
     bool is_final(const Patch& patch) const;
-    void find(std::size_t patch);
     void throw_evenly(double density);
     void throw_into_gaps();
+    void take_covered(std::size_t patch);
     void cover(std::size_t patch);
-    bool place_somewhere(const Patch& patch);
+    bool place_somewhere(std::size_t patch);
     void share_again(std::size_t patch);
     void share(std::size_t patch);
     void keep_shares(std::size_t patch);
     void add_areas(const Patch& patch, const Share* shares, std::size_t count);
     void flush_areas();
-    bool place(const Patch& patch, double x, double y, int most_steps);
-    bool is_free(const V3f& world, double x, double y, double shift, double spacing) const;
+    bool place(std::size_t patch, double x, double y, int most_steps);
+    bool is_free(const Candidates& near, const V3f& world, double x, double y, double shift, double spacing) const;
 
     PointsInTiles& points_;
     std::size_t tile_ = 0;
@@ -81,13 +84,13 @@ class TileFiller {
     double rounding_ = 0.0;  // how far a place can be from where it is stored
     RandomStream random_;
     std::vector<TileGrid::Neighbour> around_;
+    std::vector<Box3f> later_;  // what the patches of those around it lie in that are filled later
     std::vector<Patch> patches_;
     std::vector<PatchState> states_;
     std::vector<std::uint32_t> order_;
     Neighbourhood near_;
     std::vector<Dart*> entered_;  // the points in near_ that other tiles, or a filled one, have
     std::vector<Dart> placed_;    // those after them
-    Candidates candidates_;
     std::vector<Share> shares_, all_shares_;
     std::vector<ExactGap> gaps_;
     std::vector<std::int64_t> quanta_;  // for each point in near_

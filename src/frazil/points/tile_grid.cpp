@@ -2,6 +2,8 @@
 
 #include <oneapi/tbb/parallel_sort.h>
 
+#include <algorithm>
+#include <atomic>
 #include <stdexcept>
 
 #include "frazil/base/parallel.h"
@@ -12,12 +14,12 @@ namespace {
 
 constexpr int kAxisBits = 21;
 constexpr std::size_t kTriangleGrain = 4096;
+constexpr std::size_t kTileGrain = 16;
 constexpr double kHair = 1e-9;  // of a tile
 
 struct Pair {
     std::uint64_t key;
     std::int32_t triangle;
-    bool operator<(const Pair& other) const { return key != other.key ? key < other.key : triangle < other.triangle; }
 };
 
 std::uint64_t spread_bits(std::uint64_t x) {
@@ -92,6 +94,31 @@ struct TriangleTiler {
     }
 };
 
+// What the patches of a tile lie in: its whole triangles, and the larger ones as far as their parts can reach out of it.
+Box3f box_of_patches(const Mesh& mesh, const SpacingField& spacing, const TileGrid& grid, std::size_t tile) {
+    Box3f box;
+    const V3d low = grid.frame(tile, 1.0).origin(), high = low + V3d(grid.size);
+    for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
+        const V3i& t = mesh.triangles[grid.triangles[i]];
+        Box3f corners;
+        for (int k = 0; k < 3; ++k) corners.extendBy(mesh.positions[t[k]]);
+        // What is not longer than a whole triangle's edge is one.
+        const V3d extent = V3d(corners.max) - V3d(corners.min);
+        const double least = kLongestEdge * (spacing.per_vertex ? 0.0 : spacing.constant);
+        if (extent.length2() > least * least && !shape_of(mesh, spacing, grid.triangles[i]).is_whole) {
+            const double largest =
+                std::max(spacing.at_vertex(t.x), std::max(spacing.at_vertex(t.y), spacing.at_vertex(t.z)));
+            for (int axis = 0; axis < 3; ++axis) {
+                const double least = low[axis] - kPartReach * largest, most = high[axis] + kPartReach * largest;
+                corners.min[axis] = std::max(corners.min[axis], std::nextafter(float(least), -HUGE_VALF));
+                corners.max[axis] = std::min(corners.max[axis], std::nextafter(float(most), HUGE_VALF));
+            }
+        }
+        box.extendBy(corners);
+    }
+    return box;
+}
+
 }  // namespace
 
 TileFrame TileGrid::frame(std::size_t tile, double unit) const {
@@ -129,50 +156,75 @@ TileGrid make_tile_grid(const Mesh& mesh, const SpacingField& spacing, double ti
 
     const std::size_t chunks = (mesh.triangles.size() + kTriangleGrain - 1) / kTriangleGrain;
     std::vector<std::vector<Pair>> chunk_pairs(chunks);
-    std::vector<double> overhangs(chunks, 0.0);
+    std::vector<std::vector<std::uint64_t>> chunk_keys(chunks);
     parallel_for(mesh.triangles.size(), kTriangleGrain, [&](std::size_t begin, std::size_t end) {
         std::vector<Pair>& pairs = chunk_pairs[begin / kTriangleGrain];
         pairs.reserve(end - begin);
         for (std::size_t i = begin; i < end; ++i) {
-            if (unit_normal(mesh, i) == V3f(0.0f)) continue;
-            double& overhang = overhangs[begin / kTriangleGrain];
-            if (is_whole(mesh, spacing, i)) {
-                overhang = std::max(overhang, kWholeReach * longest_edge(mesh, i));
-                const V3i tile = TileFrame::tile_at(circle_center(mesh, i), grid.origin, grid.size);
-                pairs.push_back({morton(tile), std::int32_t(i)});
+            const TriangleShape shape = shape_of(mesh, spacing, i);
+            if (!shape.has_area) continue;
+            if (shape.is_whole) {
+                pairs.push_back({morton(TileFrame::tile_at(shape.center, grid.origin, grid.size)), std::int32_t(i)});
                 continue;
             }
-            const V3i& t = mesh.triangles[i];
-            overhang =
-                std::max(overhang, kPartReach * std::max(spacing.at_vertex(t.x),
-                                                         std::max(spacing.at_vertex(t.y), spacing.at_vertex(t.z))));
             TriangleTiler::Polygon polygon;
             for (int k = 0; k < 3; ++k) polygon.push(V3d(mesh.positions[mesh.triangles[i][k]]));
             TriangleTiler{grid, std::int32_t(i), pairs, max_pairs}.visit(polygon, V3i(0), V3i((1 << kAxisBits) - 1));
         }
+        std::vector<std::uint64_t>& keys = chunk_keys[begin / kTriangleGrain];
+        for (const Pair& pair : pairs) {
+            if (keys.empty() || keys.back() != pair.key) keys.push_back(pair.key);
+        }
+        std::sort(keys.begin(), keys.end());
+        keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
     });
 
-    for (const double overhang : overhangs) grid.overhang = std::max(grid.overhang, overhang);
     std::size_t total = 0;
     for (const auto& part : chunk_pairs) total += part.size();
     if (total > max_pairs) throw std::length_error("tiles");
-    std::vector<Pair> pairs;
-    pairs.reserve(total);
-    for (auto& part : chunk_pairs) {
-        pairs.insert(pairs.end(), part.begin(), part.end());
-        std::vector<Pair>().swap(part);
-    }
-    oneapi::tbb::parallel_sort(pairs.begin(), pairs.end());
 
-    grid.triangles.resize(total);
-    for (std::size_t i = 0; i < total; ++i) {
-        if (i == 0 || pairs[i].key != pairs[i - 1].key) {
-            grid.keys.push_back(pairs[i].key);
-            grid.starts.push_back(i);
-        }
-        grid.triangles[i] = pairs[i].triangle;
+    // The tiles that there are.
+    for (const auto& part : chunk_keys) grid.keys.insert(grid.keys.end(), part.begin(), part.end());
+    oneapi::tbb::parallel_sort(grid.keys.begin(), grid.keys.end());
+    grid.keys.erase(std::unique(grid.keys.begin(), grid.keys.end()), grid.keys.end());
+
+    // Count, then deal out; a run of triangles of one tile at a time.
+    std::vector<std::uint64_t> ends(grid.count(), 0);
+    const auto for_runs = [&](const auto& visit) {
+        parallel_for(chunks, 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t chunk = begin; chunk < end; ++chunk) {
+                const std::vector<Pair>& pairs = chunk_pairs[chunk];
+                for (std::size_t first = 0, last = 0; first < pairs.size(); first = last) {
+                    while (last < pairs.size() && pairs[last].key == pairs[first].key) ++last;
+                    const auto tile = std::lower_bound(grid.keys.begin(), grid.keys.end(), pairs[first].key);
+                    visit(std::size_t(tile - grid.keys.begin()), &pairs[first], last - first);
+                }
+            }
+        });
+    };
+    for_runs([&](std::size_t tile, const Pair*, std::size_t count) {
+        std::atomic_ref<std::uint64_t>(ends[tile]).fetch_add(count, std::memory_order_relaxed);
+    });
+    std::uint64_t sum = 0;
+    for (std::uint64_t& end : ends) {
+        grid.starts.push_back(sum);
+        sum += end;
+        end = grid.starts.back();
     }
-    grid.starts.push_back(total);
+    grid.starts.push_back(sum);
+    grid.triangles.resize(total);
+    for_runs([&](std::size_t tile, const Pair* pairs, std::size_t count) {
+        const std::uint64_t at = std::atomic_ref<std::uint64_t>(ends[tile]).fetch_add(count, std::memory_order_relaxed);
+        for (std::size_t i = 0; i < count; ++i) grid.triangles[at + i] = pairs[i].triangle;
+    });
+    grid.boxes.resize(grid.count());
+    parallel_for(grid.count(), kTileGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t tile = begin; tile < end; ++tile) {
+            // Whoever came first.
+            std::sort(grid.triangles.begin() + grid.starts[tile], grid.triangles.begin() + grid.starts[tile + 1]);
+            grid.boxes[tile] = box_of_patches(mesh, spacing, grid, tile);
+        }
+    });
     return grid;
 }
 

@@ -18,10 +18,10 @@ namespace frazil {
 struct TileGrid {
     V3d origin;
     double size = 1.0;
-    double overhang = 0.0;              // how far the patches of a tile can reach out of it
     std::vector<std::uint64_t> keys;    // Morton codes, ascending; the low three bits are the colour
     std::vector<std::uint64_t> starts;  // triangles of tile i: triangles[starts[i] .. starts[i + 1])
     std::vector<std::int32_t> triangles;
+    std::vector<Box3f> boxes;  // what the patches of tile i lie in, world
 
     std::size_t count() const { return keys.size(); }
     TileFrame frame(std::size_t tile, double unit) const;

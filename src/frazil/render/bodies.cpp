@@ -111,7 +111,7 @@ std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t objec
     if (lit.cells || lit.moments.empty()) return lit.cells;
     const Object& placed = scene.objects[object];
     return std::make_shared<const Cells>(
-        cells_of(lit.points, transformed(scene.meshes[placed.mesh], placed.local_to_world)));
+        cells_of(lit.points, transformed(scene.meshes[placed.mesh], placed.local_to_world), 1));
 }
 
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,

@@ -37,7 +37,8 @@ std::vector<Rgb> exitance_of(const Body& body, const PointSet& points, const Cel
     const std::vector<Rgb>& irradiance = last.values;
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
     const PointTree tree(points, irradiance, last.groups, body.profile, {}, cells, last.moments);
-    Gathered gathered = tree.gather(points.positions.data(), points.size(), options);
+    // Bounces average over many points, and compensation keeps their energy: the plain sum will do.
+    Gathered gathered = tree.gather(points.positions.data(), points.size(), {options.tolerance, Estimator::sum, false});
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;

@@ -1,7 +1,7 @@
 // Light that reaches the points of ice by way of other surfaces: ice lights ice, and diffuse surfaces light ice.
-// Model: each bounce is one gather at the points themselves, compensated as the material says, and one look around from
-//   every point: ice that it sees sends the exitance of its nearest point; opaque surfaces reflect, diffusely, what comes
-//   straight from lights.
+// Model: every point looks around once and keeps which points of ice it sees. Each bounce is one gather at the points
+//   themselves, a plain sum (noise-free ones change pictures by a thousandth), compensated so that energy is kept, and one
+//   pass along the lines of sight. Opaque surfaces reflect, diffusely, what comes straight from lights.
 // Units: W/m².
 // Valid: the same bits for any number of threads.
 // Not: light that ice throws on opaque surfaces and these throw back; glossy paths.

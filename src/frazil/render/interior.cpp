@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <unordered_map>
 
 #include "frazil/base/error.h"
@@ -197,14 +198,37 @@ InsideOf Interiors::inside_at(const V3f& position) const {
 
 Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, bool absorbs, bool* is_straight,
                           float footprint) const {
-    if (inside.is_empty()) {
+    if (is_empty_ && inside.is_empty()) {
         ++rays;
-        if (!ray_scene_.is_occluded(ray)) return Rgb(1.0f);
-        if (is_empty_) return Rgb(0.0f);
+        return Rgb(ray_scene_.is_occluded(ray) ? 0.0f : 1.0f);
     }
     Rgb result(1.0f);
     Ray rest = ray;
     bool is_within = filling(inside) != InsideOf::kNone;  // the ice that the ray begins in
+    // What a boundary lets through, its overlays first of all, is asked once it is known that the ice behind it does not
+    // swallow the light.
+    struct Boundary {
+        Hit hit;
+        bool is_entered;
+    };
+    std::optional<Boundary> entered;
+    const auto pass = [&](const Boundary& boundary) {
+        const Surface surface = resolver_.resolve(boundary.hit, ray.direction, footprint);
+        const Body& ice = *bodies_[boundary.hit.placement];
+        const float cosine = std::abs(surface.normal.dot(ray.direction));
+        result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
+        if (boundary.is_entered) {
+            result *= ice.material->refraction;
+        } else if (is_within) {
+            // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
+            // Light that goes in and out again on a straight line keeps its beam: widening it without bending it
+            // would make energy, most where it leaves at a grazing angle.
+            const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
+            const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));
+            result *= cosine / std::max(eta2 * cosine_inside, 1e-4f);
+            is_within = false;
+        }
+    };
     for (int crossings = 0; crossings < kMostCrossings; ++crossings) {
         Hit hit;
         ++rays;
@@ -216,32 +240,31 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
             const Rgb absorbed = absorbs ? medium.sigma_a * through.absorption : Rgb(0.0f);
             result *= exp(-(medium.sigma_s_prime * through.scattering + absorbed));
         }
+        if (max_component(result) < kNothing) return Rgb(0.0f);
+        if (entered) {
+            pass(*entered);
+            entered.reset();
+        }
         if (!is_hit) return result;
         if (!is_open_to_rays(hit.placement) || max_component(result) < kNothing) return Rgb(0.0f);
 
         const Crossing crossing = cross(hit, rest.direction, inside);
-        const Surface surface = resolver_.resolve(hit, rest.direction, footprint);
         if (crossing.is_boundary() && (crossing.from == InsideOf::kNone) != (crossing.to == InsideOf::kNone)) {
-            const Body& ice = *bodies_[hit.placement];
-            if (is_straight && !is_index_matched(ice.material->medium.eta)) *is_straight = false;
-            const float cosine = std::abs(surface.normal.dot(rest.direction));
-            result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
+            if (is_straight && !is_index_matched(bodies_[hit.placement]->material->medium.eta)) *is_straight = false;
             if (crossing.to != InsideOf::kNone) {
-                result *= ice.material->refraction;
-            } else if (is_within) {
-                // Light from a solid angle outside fills a smaller one inside: dw_in / dw_out by Snell's law at a plane.
-                // Light that goes in and out again on a straight line keeps its beam: widening it without bending it
-                // would make energy, most where it leaves at a grazing angle.
-                const float eta2 = ice.material->medium.eta * ice.material->medium.eta;
-                const float cosine_inside = std::sqrt(std::max(0.0f, 1.0f - (1.0f - cosine * cosine) / eta2));
-                result *= cosine / std::max(eta2 * cosine_inside, 1e-4f);
-                is_within = false;
+                entered = {hit, true};
+            } else {
+                pass({hit, false});
             }
         }
         inside = crossing.beyond;
-        rest.origin = offset_origin(surface.position, -surface.geometric_normal);
+        const float side = hit.geometric_normal.dot(rest.direction) > 0.0f ? 1.0f : -1.0f;
+        rest.origin = offset_origin(resolver_.position(hit), hit.geometric_normal * side);
         rest.t_max -= hit.t;
-        if (!(rest.t_max > 0.0f)) return result;
+        if (!(rest.t_max > 0.0f)) {
+            if (entered) pass(*entered);
+            return result;
+        }
     }
     return Rgb(0.0f);
 }

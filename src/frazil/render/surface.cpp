@@ -20,6 +20,11 @@ V3f bent_towards_viewer(const V3f& normal, const V3f& wo) {
     return (normal + wo * (kLeastCosine - cosine)).normalized();
 }
 
+// A place from its barycentrics: as exact as the vertices, unlike a ray's origin + t * direction.
+V3f at_hit(const std::vector<V3f>& positions, const V3i& triangle, const V2f& uv) {
+    return positions[triangle.x] * (1.0f - uv.x - uv.y) + positions[triangle.y] * uv.x + positions[triangle.z] * uv.y;
+}
+
 // The place that the tangent planes of a triangle's corners curve over: never below the triangle [Hanika2021]. `normals`
 // are on the viewer's side.
 V3f lifted(const V3f corners[3], const V3f normals[3], const V2f& uv, const V3f& position) {
@@ -174,6 +179,12 @@ std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSe
     return result;
 }
 
+V3f SurfaceResolver::position(const Hit& hit) const {
+    const Object& object = scene_.objects[hit.placement];
+    const Mesh& mesh = scene_.meshes[object.mesh];
+    return at_hit(mesh.positions, mesh.triangles[hit.triangle], hit.uv) * object.local_to_world;
+}
+
 Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float footprint, bool with_bump) const {
     const Object& object = scene_.objects[hit.placement];
     const Mesh& mesh = scene_.meshes[object.mesh];
@@ -181,14 +192,9 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     surface.object = hit.placement;
     surface.material = &scene_.materials[object.material];
 
-    // The place from barycentrics: as exact as the vertices, unlike origin + t * direction.
     const V3i& triangle = mesh.triangles[hit.triangle];
-    const auto at_hit = [&](const std::vector<V3f>& positions) {
-        return positions[triangle.x] * (1.0f - hit.uv.x - hit.uv.y) + positions[triangle.y] * hit.uv.x +
-               positions[triangle.z] * hit.uv.y;
-    };
-    const V3f local = at_hit(mesh.positions);
-    surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest);
+    const V3f local = at_hit(mesh.positions, triangle, hit.uv);
+    surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest, triangle, hit.uv);
     surface.position = surface.lifted = local * object.local_to_world;
 
     const V3f wo = -direction;

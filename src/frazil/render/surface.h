@@ -41,6 +41,9 @@ class SurfaceResolver {
     // normal map are left out where the surface only lets light pass.
     Surface resolve(const Hit& hit, const V3f& direction, float footprint = 0.0f, bool with_bump = false) const;
 
+    // Where a hit lies, in world space: the position that resolve gives it.
+    V3f position(const Hit& hit) const;
+
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
     std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
 
