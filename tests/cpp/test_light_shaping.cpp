@@ -218,6 +218,29 @@ TEST_CASE("light image: a rect with one white half gives what that half gives, o
     CHECK(irradiance_at({stripe}).x == doctest::Approx(expected).epsilon(0.02));
 }
 
+TEST_CASE("light image: the density of sample() is the one that a ray finds") {
+    std::vector<Rgb> pixels;
+    for (int i = 0; i < 12; ++i) pixels.emplace_back(i % 5 == 1 ? -6.0f : float(i % 3));
+    M44f scale;
+    scale.setScale(V3f(1.0f, 0.5f, 2.0f));
+    const WorldLight world(make_light(RectLight{1.5f, 2.0f, std::make_shared<LightImage>(4, 3, pixels, "/image")},
+                                      scale * translated({0.2f, 0.1f, 0.9f})));
+    const V3f position(0.0f);
+    const auto sample = [&](const V2f& u, V3f& d) {
+        LightSample s;
+        world.sample(position, {&u, 1}, {&s, 1});
+        d = s.direction;
+        return s.pdf > 0.0f;
+    };
+    const auto pdf = [&](const V3f& d) {
+        LightHit seen;
+        return world.intersect(position, d, 1e9f, seen) ? double(seen.pdf) : 0.0;
+    };
+    const auto result = chi_square(sample, pdf, V3f(0, 0, 1), 1.0);
+    CHECK(result.p_value > 1e-4);
+    CHECK(result.mass == doctest::Approx(1.0).epsilon(0.02));
+}
+
 TEST_CASE("mesh light: a square of two triangles is a rect") {
     MeshLight mesh;
     mesh.mesh = std::make_shared<Mesh>(square(1.0f, 0.0f));

@@ -1,12 +1,13 @@
 """Lights: shapes, radiance, multipliers, groups, dome images and their orientation."""
 
-import frazil as fz
 import numpy as np
 import OpenImageIO as oiio
 import pytest
 from pxr import Gf, Sdf, UsdGeom, UsdLux
 from test_usd_materials import write_image
 from usd_stages import add_quad, load, new_stage
+
+import frazil as fz
 
 
 @pytest.fixture
