@@ -100,6 +100,7 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
         meaning="where inputs that are not authored take their values from, overlays too (docs/material.md)",
     ),
     MaterialInput("preset_scale", "float", 1.0, 1e-6, meaning="how much larger the preset's lengths are"),
+    MaterialInput("preset_depth", "float", 1.0, meaning="metres of ice that a metre counts for in colour"),
     MaterialInput("age", "float", 0.5, 0.0, 1.0, meaning="0 = fresh .. 1 = old: brings out the overlays"),
     MaterialInput("tint", "color", (1.0, 1.0, 1.0), takes_texture=True, meaning="multiplies what leaves the core"),
     MaterialInput("normal", "normal", None, takes_texture=True, meaning="tangent-space normal map"),
