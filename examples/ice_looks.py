@@ -21,6 +21,7 @@ from frazil.formations.noise import Noise
 from frazil.formations.sky import make_sky
 from frazil.ice import ICE_PRESETS
 from frazil.image import write_png
+from gallery import save_small
 from scenery import Rock
 
 kSun = np.array([-0.65, 0.36, -0.65])  # behind the ice, to the left
@@ -155,7 +156,9 @@ def depths(size: int, samples: int) -> np.ndarray:
     scene = set_scene((0.35, 0.75, 3.4), (0.0, 0.42, 0.0), 62.0)
     block = Block((2.0, 1.0, 1.1), 4)
     mesh = to_mesh(contour(block, *block.bounds(), 0.025).largest_piece())
-    ice = scene.add_material("/ice", fz.ice_preset("arctic_blue", age=0.12, roughness=0.04, refraction_roughness=0.05))
+    ice = scene.add_material(
+        "/ice", fz.ice_preset("arctic_blue", age=0.12, depth=kDepth, roughness=0.04, refraction_roughness=0.05)
+    )
     scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), ice, lifted(0.46))
     stone = scene.add_material("/stone", fz.StandardMaterial(diffuse_color=(0.16, 0.13, 0.11), roughness=0.6))
     for number, (x, depth) in enumerate(((-0.52, 0.05), (0.0, 0.25), (0.52, 0.5))):
@@ -181,6 +184,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=("sheet", "depths", "breath"))
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
+    parser.add_argument("--docs", type=Path, help="a small copy, of 6 bits a channel")
     parser.add_argument("--size", type=int, default=150, help="pixels along a side of one picture")
     parser.add_argument("--samples", type=int, default=16, help="per pixel")
     options = parser.parse_args(arguments)
@@ -189,6 +193,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         write_png(options.output, np.ascontiguousarray(pixels))
+        if options.docs:
+            save_small(options.output, options.docs)
     except OSError as error:
         print(error, file=sys.stderr)
         return 1

@@ -1421,6 +1421,7 @@ class IceMaterial:
     specular, translucency : weights in [0, 1] of the reflection and of the core.
     refraction : how much of what the medium leaves unscattered is seen through the boundary, in [0, 1].
     refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.
+    refraction_tint : RGB factor in [0, 1] on light each time that it goes through the boundary unscattered.
     volume : how much of the light scattered once inside is traced, in [0, 1].
     anisotropy : g of that light, in [-0.95, 0.95].
     density : Density, by which the medium is multiplied along refracted rays, from place to place.
@@ -1439,7 +1440,7 @@ class IceMaterial:
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, volume: float = 0.0, anisotropy: float = 0.0, density: Density = ..., priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, refraction_tint: Sequence[float] = [1.0, 1.0, 1.0], volume: float = 0.0, anisotropy: float = 0.0, density: Density = ..., priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...
@@ -1500,6 +1501,12 @@ class IceMaterial:
 
     @refraction_roughness.setter
     def refraction_roughness(self, value: float | None) -> None: ...
+
+    @property
+    def refraction_tint(self) -> list[float]: ...
+
+    @refraction_tint.setter
+    def refraction_tint(self, arg: Sequence[float], /) -> None: ...
 
     @property
     def volume(self) -> float: ...
