@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <cstring>
+#include <string>
 
 #include "frazil/base/error.h"
 #include "frazil/base/random.h"
@@ -333,7 +334,7 @@ TEST_CASE("every set of instructions makes the same points") {
     const PointSet even = poisson_points(mesh, 0.05), varying = poisson_points(mesh, spacing);
     const auto targets = hwy::SupportedAndGeneratedTargets();
     for (const auto target : targets) {
-        CAPTURE(hwy::TargetName(target));
+        CAPTURE(std::string(hwy::TargetName(target)));
         hwy::SetSupportedTargetsForTest(target);
         hwy::GetChosenTarget().Update(hwy::SupportedTargets());
         const PointSet even_here = poisson_points(mesh, 0.05), varying_here = poisson_points(mesh, spacing);
