@@ -49,7 +49,7 @@ TEST_CASE("placed points: sums where the cloud is are those of the points, cells
     const Mesh mesh = sphere(0.3f, 4), there = transformed(mesh, somewhere());
     const PlacedPoints placed(std::make_shared<PointCloud>(poisson_points(mesh, 0.03)), somewhere());
     Cells cells;
-    placed.cloud().add_cells([&](const PointSet& points) { return cells = cells_of(points, mesh, 64); });
+    placed.cloud().add_cells(true, [&](const PointSet& points) { return cells = cells_of(points, mesh, 64); });
     const CellMeans light = cell_means(cells, there, light_at(cells, there), 2);
     const auto kernel = make_tree_kernel(Dipole(kMedium));
     const PointTree tree(placed.cloud().clusters(), kernel, light.means, 2, placed.into_cloud(light.moments));
@@ -136,4 +136,17 @@ TEST_CASE("a bake shares the points of objects that place a mesh in one size, mi
         CHECK(away.length() == doctest::Approx(1.0f).epsilon(0.02));
         CHECK(away.normalized().dot(points.normals[k]) > 0.95f);
     }
+}
+
+TEST_CASE("a bake takes over what is known in memory, and bakes the lights that are new as if it had made all") {
+    Scene scene = scene_of(sphere(1.0f, 3), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::depth));
+    scene.lights = {dome(Rgb(1.0f))};
+    RenderOptions options = small();
+    options.spacing = 0.2f;
+    options.bake_bounces = 1;
+    const Bake known = bake(scene, options).bake;
+    scene.lights.push_back(rect_above(5.0f, "key"));
+    const Bake grown = bake(scene, options, known).bake, anew = bake(scene, options).bake;
+    CHECK(grown.bodies[0].irradiance == anew.bodies[0].irradiance);
+    CHECK(grown.bodies[0].moments == anew.bodies[0].moments);
 }

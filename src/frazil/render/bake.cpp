@@ -215,7 +215,7 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
             // No more than shadow rays; fewer where points are so many that their cells are small.
             const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), 8,
                                           std::clamp(options.bake_samples, 8, 256));
-            cloud.add_cells([&](const PointSet& points) {
+            cloud.add_cells(true, [&](const PointSet& points) {
                 return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), places);
             });
             cells = cloud.cells();

@@ -168,7 +168,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (!bodies[i] || lit[i].moments.empty()) continue;
         PointCloud& cloud = lit[i].points.cloud();
         cloud.add_cells(
-            [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
+            false, [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
         cloud.drop_places();
     }
     const TranslucencySets sets(scene, ray_scene, bodies, lit);

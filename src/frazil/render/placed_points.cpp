@@ -9,9 +9,9 @@ std::shared_ptr<const Cells> PointCloud::cells() const {
     return cells_;
 }
 
-void PointCloud::add_cells(const std::function<Cells(const PointSet&)>& make) {
+void PointCloud::add_cells(bool needs_places, const std::function<Cells(const PointSet&)>& make) {
     const std::lock_guard lock(mutex_);
-    if (cells_) return;
+    if (cells_ && !(needs_places && cells_->places.empty())) return;
     cells_ = std::make_shared<const Cells>(make(points_));
     clusters_ = nullptr;
 }

@@ -23,8 +23,8 @@ class PointCloud {
     const PointSet& points() const { return points_; }
     // Null where light is baked at the points alone.
     std::shared_ptr<const Cells> cells() const;
-    // Give it cells unless it has some.
-    void add_cells(const std::function<Cells(const PointSet&)>& make);
+    // Give it cells unless it has some; with places where `needs_places`.
+    void add_cells(bool needs_places, const std::function<Cells(const PointSet&)>& make);
     // Places are of use to bakes alone.
     void drop_places();
 

@@ -87,7 +87,7 @@ void TranslucencySets::unite(Union& set) const {
         }
     }
     set.points = PlacedPoints(std::move(points));
-    if (has_cells) set.points.cloud().add_cells([&](const PointSet&) { return std::move(cells); });
+    if (has_cells) set.points.cloud().add_cells(false, [&](const PointSet&) { return std::move(cells); });
 }
 
 const TranslucencySets::Union* TranslucencySets::find(std::size_t leader) const {
