@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+PEERS_FOLDER = Path("build/peers")
 PEERS = ("pymeshlab", "libigl", "open3d", "trimesh", "mitsuba", "bpy")
 
 # Each runs as `python -c SCRIPT mesh count spacing output threads`: load, then time the sampler alone.
@@ -90,8 +91,11 @@ def run(python: str, name: str, mesh: Path, count: int, spacing: float, threads:
     return dict(np.load(output))
 
 
-def measure(points: np.ndarray, places: np.ndarray) -> dict:
-    """Nearest pair, largest gap over places on the surface (both through the air), spread, pair correlation."""
+def measure(points: np.ndarray, places: np.ndarray, area: float) -> dict:
+    """Nearest pair, largest gap over places on the surface (both through the air), spread, pair correlation.
+
+    The relative radius is the nearest pair over that of the densest packing of as many points [Lagae2008]; the pair
+    correlation is 1 where a distance is as frequent as among points at random."""
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points)
@@ -105,13 +109,21 @@ def measure(points: np.ndarray, places: np.ndarray) -> dict:
     counts = np.histogram(distances[distances > 0], edges)[0]
     ring = np.pi * (edges[1:] ** 2 - edges[:-1] ** 2)
     correlation = counts / ring / len(some)
+    correlation /= correlation[-20:].mean()
+    middles = 0.5 * (edges[1:] + edges[:-1]) / scale
     return {
+        "relative_radius": float(nearest.min() / np.sqrt(2 / np.sqrt(3) * area / len(points))),
+        "close_pairs": float(correlation[middles < 0.9].mean()),
+        "peak": float(correlation.max()),
+        "peak_radius": float(middles[correlation.argmax()]),
+        # How far the curve still swings: 0 = no order at a distance.
+        "swing": float(np.abs(correlation[(middles > 1.5) & (middles < 3)] - 1).mean()),
         "min": float(nearest.min()),
         "gap": float(gap),
         "gap_over_min": float(gap / nearest.min()) if nearest.min() > 0 else None,
         "spread": float(nearest.std() / nearest.mean()),
-        "correlation": (correlation / correlation[-20:].mean()).tolist(),
-        "radius_over_median": (0.5 * (edges[1:] + edges[:-1]) / scale).tolist(),
+        "correlation": correlation.tolist(),
+        "radius_over_median": middles.tolist(),
     }
 
 
@@ -131,11 +143,9 @@ def peers_python(folder: Path) -> str:
     python = folder / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy"], check=True)
+        subprocess.run([str(python), "-m", "pip", "install", "-q", "numpy", "scipy", "matplotlib"], check=True)
         for peer in PEERS:  # a peer without a package for this Python is a row that says so
             subprocess.run([str(python), "-m", "pip", "install", "-q", peer])
-    if find_library("usb-1.0") is None and os.geteuid() == 0:
-        subprocess.run(["apt-get", "install", "-qq", "-y", "libusb-1.0-0"], capture_output=True)
     return str(python)
 
 
@@ -162,35 +172,60 @@ def table(rows: list[dict], mesh: str) -> list[str]:
     return lines
 
 
-def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
+def quality_table(rows: list[dict]) -> list[str]:
+    """What the points are as blue noise, as markdown."""
+    lines = [
+        "| sampler | points | relative radius | gap / nearest pair | spread | close pairs | peak | at | swing |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        if "error" in row:
+            continue
+        gap = f"{row['gap_over_min']:.2f}" if row["gap_over_min"] else "-"
+        lines.append(
+            f"| {row['sampler']} | {row['points']:,} | {row['relative_radius']:.2f} | {gap} | {row['spread']:.3f} "
+            f"| {row['close_pairs']:.3f} | {row['peak']:.2f} | {row['peak_radius']:.2f} | {row['swing']:.3f} |"
+        )
+    return lines
+
+
+def plot_correlation(axis, rows: list[dict], colors: dict, title: str) -> None:
+    """The pair correlation of each row with one."""
+    for row in rows:
+        style = {"lw": 2.2 if row["sampler"].startswith("frazil") else 1.2, "color": colors[row["sampler"]]}
+        axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"], **style)
+    axis.axhline(1, color="0.8", lw=0.8, zorder=0)
+    axis.set(xlabel="distance / median nearest distance", ylabel="pair correlation", title=title, ylim=0, xlim=(0, 4))
+    axis.legend(frameon=False, fontsize=9)
+
+
+def write(rows: list[dict], mesh: str, area: float, options: argparse.Namespace) -> None:
+    output = options.output
     output.parent.mkdir(parents=True, exist_ok=True)
     output.with_suffix(".json").write_text(json.dumps({"mesh": mesh, "area": area, "rows": rows}, indent=1))
-    lines = table(rows, mesh)
+    lines = [*table(rows, mesh), "", *quality_table(rows)]
     output.with_suffix(".md").write_text("\n".join(lines) + "\n")
     print("\n".join(lines))
-    try:
-        import matplotlib
+    python = options.peers_python or str(PEERS_FOLDER / "bin" / "python")
+    command = [python, __file__, "--draw", str(output.with_suffix(".json"))]
+    subprocess.run(command + (["--plot", str(options.plot)] if options.plot else []), check=True)
 
-        matplotlib.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError:
-        print("matplotlib is not installed: no plot")
-        return
+
+def draw(results: Path, plot: Path | None) -> None:
+    """The figures of a run's .json; runs where matplotlib is, among the peers."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    data = json.loads(results.read_text())
+    rows, mesh = data["rows"], data["mesh"]
     figure, (axis, bars) = plt.subplots(1, 2, figsize=(11, 3.8), gridspec_kw={"width_ratios": (3, 2)})
     least = min(row["asked"] for row in rows)
     shown = [row for row in rows if "correlation" in row]
     colors = {name: f"C{i}" for i, name in enumerate(SCRIPTS)}
-    for row in shown:
-        if row["asked"] == least:
-            style = {"lw": 2.2 if row["sampler"].startswith("frazil") else 1.2, "color": colors[row["sampler"]]}
-            axis.plot(row["radius_over_median"], row["correlation"], label=row["sampler"], **style)
-    axis.set(
-        xlabel="distance / median nearest distance",
-        ylabel="pair correlation",
-        title=f"{mesh}, {least:,} points",
-        ylim=0,
-    )
-    axis.legend(frameon=False, fontsize=9)
+    correlated = [row for row in shown if row["asked"] == least]
+    plot_correlation(axis, correlated, colors, f"{mesh}, {least:,} points")
     bars.barh(
         [f"{row['sampler']}, {row['asked']:,}" for row in reversed(shown)],
         [row["rate"] for row in reversed(shown)],
@@ -199,7 +234,12 @@ def write(rows: list[dict], output: Path, mesh: str, area: float) -> None:
     bars.set(xscale="log", xlabel="points / s")
     bars.tick_params(axis="y", labelsize=8)
     figure.tight_layout()
-    figure.savefig(output.with_suffix(".png"), dpi=80)
+    figure.savefig(results.with_suffix(".png"), dpi=80)
+    if plot:
+        figure, axis = plt.subplots(figsize=(7, 3.6))
+        plot_correlation(axis, correlated, colors, f"{mesh}, about {least:,} points")
+        figure.tight_layout()
+        figure.savefig(plot, dpi=90)
 
 
 def main() -> None:
@@ -210,8 +250,12 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=600.0, help="seconds a sampler may take")
     parser.add_argument("--peers-python", help="a Python that has the peers; otherwise one is made in build/peers")
     parser.add_argument("--only", nargs="+", choices=list(SCRIPTS), default=list(SCRIPTS))
+    parser.add_argument("--plot", type=Path, help="also write the pair correlation alone, as PNG")
     parser.add_argument("-o", "--output", type=Path, default=Path("bench/results/points"))
+    parser.add_argument("--draw", type=Path, metavar="JSON", help="only draw the results of an earlier run")
     options = parser.parse_args()
+    if options.draw:
+        return draw(options.draw, options.plot)
 
     from frazil.mesh_io import read_mesh
 
@@ -223,17 +267,19 @@ def main() -> None:
     else:
         mesh, title = read_mesh(options.mesh), options.mesh.name
     rows = measure_all(mesh, options)
-    write(rows, options.output, title, mesh.area)
+    write(rows, title, mesh.area, options)
 
 
 def measure_all(mesh, options: argparse.Namespace) -> list[dict]:
     """A row for every sampler and count of the options."""
     vertices, faces = mesh.positions.astype(np.float64), mesh.triangles.copy()
     rows = []
+    if find_library("usb-1.0") is None and os.geteuid() == 0:  # for Open3D
+        subprocess.run(["apt-get", "install", "-qq", "-y", "libusb-1.0-0"], capture_output=True)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         np.savez(folder / "mesh.npz", V=vertices, F=faces)
-        peers = options.peers_python or peers_python(Path("build/peers"))
+        peers = options.peers_python or peers_python(PEERS_FOLDER)
         for count in options.counts:
             places, area = sample(vertices, faces, max(500_000, 2 * count))
             spacing = float(np.sqrt(0.71 * area / count))
@@ -256,7 +302,7 @@ def measure_all(mesh, options: argparse.Namespace) -> list[dict]:
                     "rate": rate,
                     "slower": reference / rate,
                 }
-                row |= {"bytes": float(got["peak"] - got["base"]) / number} | measure(got["P"], places)
+                row |= {"bytes": float(got["peak"] - got["base"]) / number} | measure(got["P"], places, area)
                 if "A" in got:
                     row["area_error"] = float(abs(got["A"].sum(dtype="f8") / area - 1))
                 rows.append(row)

@@ -1,10 +1,12 @@
-"""Pictures of the ice material: presets at three ages, rocks at three depths, and breath ice with its volume.
+"""Pictures of the ice material: presets at ages, rocks at three depths, breath ice, shells that run into each other.
 
-    python examples/ice_looks.py sheet -o out/ice_sheet.png [--size 160] [--samples 48]
+    python examples/ice_looks.py sheet -o out/ice_sheet.png [--size 150] [--samples 16]
     python examples/ice_looks.py depths -o out/ice_depths.png
     python examples/ice_looks.py breath -o out/ice_breath.png
+    python examples/ice_looks.py shells -o out/ice_shells.png
 
-The scenes are made in Python, without USD: a broken block of ice on snow under a cold sky and a low sun.
+The scenes are made in Python, without USD: a piece of ice on snow under a cold sky, a low sun behind it. Pictures are
+denoised.
 """
 
 import argparse
@@ -16,13 +18,17 @@ import numpy as np
 
 import frazil as fz
 from frazil.formations.contour import Surface, contour, corner_normals
+from frazil.formations.noise import Noise
 from frazil.formations.sky import make_sky
 from frazil.ice import ICE_PRESETS
 from frazil.image import write_png
+from gallery import save_small
 from scenery import Rock
 
-kSun = np.array([-0.75, 0.42, -0.55])  # behind the ice, to the left
+kSun = np.array([-0.65, 0.36, -0.65])  # behind the ice, to the left
+kSkyLight, kSunlight = 0.75, (3.2, 2.6, 2.0)
 kAges = (0.0, 0.5, 1.0)
+kDepth = 8.0  # metres of ice that a block of one metre shows in colour
 
 
 class Block:
@@ -38,6 +44,35 @@ class Block:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         return -self._half - 0.06, self._half + 0.06
+
+
+class Shard:
+    """A field of a splinter of ice: nine walls that lean together, broken off aslant."""
+
+    kTaper = 0.85
+
+    def __init__(self, size, seed: int):
+        self._half = np.asarray(size, float) / 2
+        rng = np.random.default_rng(seed)
+        self._walls = rng.normal(size=(9, 3))[:, ::2]
+        self._walls /= np.linalg.norm(self._walls, axis=1, keepdims=True)
+        self._reach = rng.uniform(0.55, 0.9, 9)
+        self._noise = Noise(seed)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        height = np.clip(points[:, 1] / self._half[1] * 0.5 + 0.5, -0.1, 1.3)
+        width = np.maximum(1.0 - self.kTaper * height, 0.05)
+        x = (points[:, 0] - 0.25 * (height - 0.3)) / (0.25 + 0.75 * width)
+        across = np.stack([x, points[:, 2] / width], 1) / self._half[[0, 2]]
+        across += 0.06 * self._noise.vector(points, 0.4, 0)[:, [0, 2]]
+        d = np.abs(points[:, 1]) - self._half[1]
+        for wall, reach in zip(self._walls, self._reach, strict=True):
+            d = np.maximum(d, (across @ wall - reach) * self._half.min() * width)
+        d = np.maximum(d, 0.9 * (points @ [0.35, 0.9, 0.1] - 0.72 * self._half[1]))
+        return 0.7 * d + 0.008 * self._noise.fractal(points, 0.15, 3, 5, 0.6)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return -self._half - 0.15, self._half + 0.15
 
 
 def to_mesh(surface: Surface, crease: float = 30.0) -> fz.Mesh:
@@ -69,12 +104,12 @@ def set_scene(eye, to, focal_length: float = 50.0) -> fz.Scene:
     )
     snow = fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
     scene.add_object("/snow", scene.add_mesh(ground, "/snow"), scene.add_material("/snow", snow))
-    sky = make_sky(512, kSun, 5)
-    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=(0.75, 0.75, 0.75), path="/sky", group="sky"))
+    sky = make_sky(2048, kSun, 5)
+    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (kSkyLight,), path="/sky", group="sky"))
     scene.add_light(
         fz.Light(
             fz.DistantLight(2.5),
-            radiance=(3.4, 2.9, 2.3),
+            radiance=kSunlight,
             normalize=True,
             matrix=frame(kSun, (0, 0, 0)),
             path="/sun",
@@ -94,20 +129,24 @@ def lifted(height: float) -> np.ndarray:
 
 
 def picture(scene: fz.Scene, width: int, height: int, samples: int) -> np.ndarray:
-    return fz.render(scene, resolution=(width, height), samples=samples)["beauty"][..., :3]
+    return fz.render(scene, resolution=(width, height), samples=samples, denoise=True)["beauty"][..., :3]
+
+
+def add_shard(scene: fz.Scene, ice: fz.IceMaterial) -> None:
+    """The splinter that the looks are shown on."""
+    shard = Shard((1.05, 1.15, 0.8), 4)
+    mesh = to_mesh(contour(shard, *shard.bounds(), 0.02).largest_piece())
+    scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), scene.add_material("/ice", ice), lifted(0.5))
 
 
 def sheet(size: int, samples: int) -> np.ndarray:
     """Presets from top to bottom, ages from left to right."""
-    block = Block((0.95, 1.05, 0.7), 4)
-    mesh = to_mesh(contour(block, *block.bounds(), 0.022).largest_piece())
     rows = []
     for name in ICE_PRESETS:
         row = []
         for age in kAges:
-            scene = set_scene((1.4, 0.85, 2.6), (0.02, 0.44, 0.0), 78.0)
-            material = scene.add_material("/ice", fz.ice_preset(name, age=age, spacing=0.02))
-            scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), material, lifted(0.44))
+            scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
+            add_shard(scene, fz.ice_preset(name, age=age, depth=kDepth, spacing=0.025))
             row.append(picture(scene, size, size, samples))
         rows.append(np.concatenate(row, 1))
     return np.concatenate(rows, 0)
@@ -118,7 +157,9 @@ def depths(size: int, samples: int) -> np.ndarray:
     scene = set_scene((0.35, 0.75, 3.4), (0.0, 0.42, 0.0), 62.0)
     block = Block((2.0, 1.0, 1.1), 4)
     mesh = to_mesh(contour(block, *block.bounds(), 0.025).largest_piece())
-    ice = scene.add_material("/ice", fz.ice_preset("arctic_blue", age=0.12, roughness=0.04, refraction_roughness=0.05))
+    ice = scene.add_material(
+        "/ice", fz.ice_preset("arctic_blue", age=0.12, depth=kDepth, roughness=0.04, refraction_roughness=0.05)
+    )
     scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), ice, lifted(0.46))
     stone = scene.add_material("/stone", fz.StandardMaterial(diffuse_color=(0.16, 0.13, 0.11), roughness=0.6))
     for number, (x, depth) in enumerate(((-0.52, 0.05), (0.0, 0.25), (0.52, 0.5))):
@@ -129,30 +170,60 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice: without and with the light that it scatters once."""
-    block = Block((0.95, 1.05, 0.7), 6)
-    mesh = to_mesh(contour(block, *block.bounds(), 0.022).largest_piece())
+    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles."""
+    clouds = fz.Density(contrast=1.3, size=0.35, octaves=4, absorption=0.0, seed=2)
     pictures = []
-    for volume in (0.0, 1.0):
-        scene = set_scene((1.4, 0.85, 2.6), (0.02, 0.44, 0.0), 78.0)
-        material = scene.add_material("/ice", fz.ice_preset("fresh_breath", age=0.35, spacing=0.02, volume=volume))
-        scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), material, lifted(0.44))
+    for volume, density in ((0.0, fz.Density()), (1.0, fz.Density()), (1.0, clouds)):
+        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
+        ice = fz.ice_preset("fresh_breath", age=0.35, depth=4.0, spacing=0.03, volume=volume, density=density)
+        add_shard(scene, ice)
+        pictures.append(picture(scene, size, size, samples))
+    return np.concatenate(pictures, 1)
+
+
+def shells(size: int, samples: int) -> np.ndarray:
+    """Seven splinters that run into each other: each for itself, and as one translucency set."""
+    shard = Shard((1.05, 1.15, 0.8), 4)
+    mesh = to_mesh(contour(shard, *shard.bounds(), 0.025).largest_piece())
+    rng = np.random.default_rng(1)
+    places = []
+    for number in range(7):
+        turn, lean = 2 * np.pi * number / 7 + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.45)
+        c, s = np.cos(turn), np.sin(turn)
+        upright = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+        tilted = np.array([[np.cos(lean), np.sin(lean), 0], [-np.sin(lean), np.cos(lean), 0], [0, 0, 1]])
+        matrix = np.eye(4)
+        matrix[:3, :3] = rng.uniform(0.55, 0.9) * tilted @ upright
+        matrix[3, :3] = 0.28 * c, 0.33, 0.28 * s
+        places.append(matrix)
+    pictures = []
+    for together in ("", "ice"):
+        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.42, 0.0), 64.0)
+        ice = fz.ice_preset("old_glacier", age=0.2, depth=kDepth, spacing=0.03, overlays=[])
+        material, geometry = scene.add_material("/ice", ice), scene.add_mesh(mesh, "/ice")
+        for number, matrix in enumerate(places):
+            scene.add_object(f"/ice{number}", geometry, material, matrix, translucency_set=together)
         pictures.append(picture(scene, size, size, samples))
     return np.concatenate(pictures, 1)
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("sheet", "depths", "breath"))
+    parser.add_argument("what", choices=("sheet", "depths", "breath", "shells"))
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
-    parser.add_argument("--size", type=int, default=160, help="pixels along a side of one picture")
-    parser.add_argument("--samples", type=int, default=48, help="per pixel")
+    parser.add_argument("--docs", type=Path, help="a small copy, of 6 bits a channel")
+    parser.add_argument("--size", type=int, default=150, help="pixels along a side of one picture")
+    parser.add_argument("--samples", type=int, default=16, help="per pixel")
     options = parser.parse_args(arguments)
     start = time.monotonic()
-    pixels = {"sheet": sheet, "depths": depths, "breath": breath}[options.what](options.size, options.samples)
+    pixels = {"sheet": sheet, "depths": depths, "breath": breath, "shells": shells}[options.what](
+        options.size, options.samples
+    )
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         write_png(options.output, np.ascontiguousarray(pixels))
+        if options.docs:
+            save_small(options.output, options.docs)
     except OSError as error:
         print(error, file=sys.stderr)
         return 1

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+kRidge = 0.12  # of a shard's radius, over which its ridges are rounded
+kThinRidge = 0.04  # metres: how thick a ridge counts
+
 
 @dataclass(frozen=True)
 class Spire:
@@ -67,7 +70,8 @@ def break_off(rng: np.random.Generator, base, tip) -> np.ndarray:
 
 
 def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The field (N,) at points (N, 3), and the shard's radius (N,) at that height (0 at the tip)."""
+    """The field (N,) at points (N, 3), and how thick the shard is there (N,): its radius at that height (0 at the tip),
+    less near ridges, which are rounded a little."""
     axis = spire.tip - spire.base
     length = np.linalg.norm(axis)
     axis = axis / length
@@ -87,7 +91,8 @@ def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     radius = spire.radius * np.where(rest > 0, np.maximum(rest, 1e-9) ** spire.power, rest)
     wide = np.maximum(radius, 1e-4)
     slope = 1.0 / np.hypot(1.0, spire.radius / length)
-    result = np.full(len(points), -np.inf)
+    result = np.full(len(points), -1e9)
+    ridge = np.full(len(points), 1e9)  # how far the next face is from being the surface
     for (angle, hollow, width, flute, phase), offset in zip(spire.faces, spire.offsets, strict=True):
         ca, sa = np.cos(angle), np.sin(angle)
         across = (z * ca - x * sa) / wide
@@ -96,9 +101,11 @@ def distance(spire: Spire, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if flute > 0:
             cup = 2.0 * np.mod(across / width + phase + 0.6 * np.sin(5.0 * s + 9.0 * phase), 1.0) - 1.0
             out += wide * flute * (1.0 - cup * cup)
-        np.maximum(result, out * slope, out=result)
+        out *= slope
+        ridge = np.where(out > result, np.minimum(out - result, 1e9), np.minimum(ridge, result - out))
+        result = -smooth_min(-result, -out, kRidge * wide)
     np.maximum(result, points @ spire.cut[:3] - spire.cut[3], out=result)
-    return np.maximum(result, -s * length - 0.1), np.maximum(radius, 0.0)
+    return np.maximum(result, -s * length - 0.1), np.clip(radius, 0.0, kThinRidge + ridge)
 
 
 def bounds(spire: Spire) -> tuple[np.ndarray, np.ndarray]:

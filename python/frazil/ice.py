@@ -1,9 +1,11 @@
 """Looks of ice to start from: media, surfaces and overlays that belong together, and the age that drives them.
 
-Model: a preset is a medium, a few inputs of IceMaterial and a list of overlays, for bodies of about a metre: absorption
-is that of glacier ice times about eight, so that a metre shows what a glacier shows in ten.
-Units: metres; `scale` makes all lengths larger and all coefficients smaller.
-Not: measurements; `frazil.optics` has the physics of bubbles and impurities.
+Model: a preset is a medium, a few inputs of IceMaterial and a list of overlays for bodies of about a metre.
+Absorption is that of ice per metre, from `frazil.optics` (pure ice of [WarrenBrandt2008]; sea ice with some dust and
+algae), which is why small bodies are nearly colourless.
+Units: metres; `scale` makes all lengths larger and all coefficients smaller; `depth` multiplies absorption, so that a
+metre shows what a glacier shows in so many.
+Not: measurements of scattering and overlays, which are looks.
 """
 
 from __future__ import annotations
@@ -77,7 +79,7 @@ ICE_PRESETS: dict[str, IcePreset] = {
     "fresh_breath": IcePreset(
         "just frozen: clear, a breath of frost on it, light scattered once inside",
         (1.1, 1.1, 1.1),
-        (0.60, 0.15, 0.04),
+        (0.149, 0.048, 0.0037),
         {"roughness": 0.06, "refraction_roughness": 0.10, "volume": 1.0, "anisotropy": 0.3},
         (
             _cracks(age_begin=0.25, age_end=1.0, amount=0.4),
@@ -88,21 +90,21 @@ ICE_PRESETS: dict[str, IcePreset] = {
     "arctic_blue": IcePreset(
         "dense and blue, old air pressed out; planes of fracture",
         (3.0, 3.0, 3.0),
-        (2.2, 0.55, 0.10),
+        (0.149, 0.048, 0.0037),
         {"roughness": 0.12, "refraction_roughness": 0.16},
         (_cracks(), _cells(opacity=0.6), _frost(amount=0.36), _snow(age_begin=0.6)),
     ),
     "old_glacier": IcePreset(
         "bubbly, with bands of dirt, frosted cracks and snow",
         (14.0, 14.0, 14.0),
-        (2.4, 0.56, 0.13),
+        (0.149, 0.048, 0.0037),
         {"roughness": 0.3},
         (_dirt(), _cracks(opacity=0.95), _cells(size=0.22, width=0.007, feather=0.012, amount=0.6), _frost(), _snow()),
     ),
     "weathered_white": IcePreset(
         "a crust of sun and wind: white, cracked all over",
         (45.0, 45.0, 45.0),
-        (1.1, 0.24, 0.08),
+        (0.149, 0.048, 0.0037),
         {"roughness": 0.5, "refraction": 0.6},
         (
             _cells(
@@ -115,7 +117,7 @@ ICE_PRESETS: dict[str, IcePreset] = {
     "sea_ice": IcePreset(
         "milky, green below, layers of brine and bubbles under snow",
         (9.0, 9.0, 9.0),
-        (1.9, 0.26, 0.20),
+        (0.160, 0.067, 0.081),
         {"roughness": 0.25},
         (
             _bubbles(amount=0.6, opacity=0.6),
@@ -128,7 +130,7 @@ ICE_PRESETS: dict[str, IcePreset] = {
 }
 
 
-def ice_preset(name: str, age: float = 0.5, scale: float = 1.0, **changes: Any) -> IceMaterial:
+def ice_preset(name: str, age: float = 0.5, scale: float = 1.0, depth: float = 1.0, **changes: Any) -> IceMaterial:
     """An ice material of ICE_PRESETS.
 
     Parameters
@@ -139,6 +141,9 @@ def ice_preset(name: str, age: float = 0.5, scale: float = 1.0, **changes: Any) 
         From 0, fresh, to 1, old: how far its cracks, frost and snow have come out.
     scale : float
         > 0; how much larger the body is than the metre that the preset is made for.
+    depth : float
+        >= 0; how many metres of ice each metre counts for in colour: 8 makes a block as blue as a glacier's wall.
+        `depth` = `scale` keeps the absorption of real ice at any size.
     **changes
         Arguments of IceMaterial that take the place of the preset's; `medium` too.
 
@@ -151,18 +156,18 @@ def ice_preset(name: str, age: float = 0.5, scale: float = 1.0, **changes: Any) 
     KeyError
         For an unknown name; the message has the nearest.
     ValueError
-        For a scale that is not > 0.
+        For a scale that is not > 0, a depth that is not >= 0.
 
     Examples
     --------
     >>> import frazil as fz
-    >>> ice = fz.ice_preset("arctic_blue", age=0.3, scale=2.0)
+    >>> ice = fz.ice_preset("arctic_blue", age=0.3, scale=2.0, depth=8.0)
     >>> len(ice.overlays), ice.age < 0.5
     (4, True)
     """
     preset = find_preset(name)
     return IceMaterial(
-        **{"medium": preset_medium(preset, scale), "overlays": preset_overlays(preset, scale), "age": age}
+        **{"medium": preset_medium(preset, scale, depth), "overlays": preset_overlays(preset, scale), "age": age}
         | preset.inputs
         | changes
     )
@@ -176,11 +181,13 @@ def find_preset(name: str) -> IcePreset:
     raise KeyError(f"ice_preset: name must be one of {', '.join(ICE_PRESETS)}, got {name!r}. Did you mean {nearest!r}?")
 
 
-def preset_medium(preset: IcePreset, scale: float = 1.0, eta: float = 1.31) -> Medium:
-    """The preset's medium for a body `scale` times as large."""
+def preset_medium(preset: IcePreset, scale: float = 1.0, depth: float = 1.0, eta: float = 1.31) -> Medium:
+    """The preset's medium for a body `scale` times as large, `depth` times as deep in colour."""
     if not scale > 0.0:
         raise ValueError(f"ice_preset: scale must be > 0, got {scale}.")
-    return Medium([s / scale for s in preset.sigma_s_prime], [s / scale for s in preset.sigma_a], eta)
+    if not depth >= 0.0:
+        raise ValueError(f"ice_preset: depth must be >= 0, got {depth}.")
+    return Medium([s / scale for s in preset.sigma_s_prime], [s * depth / scale for s in preset.sigma_a], eta)
 
 
 def preset_overlays(preset: IcePreset, scale: float = 1.0, **changes: Any) -> list[Overlay]:

@@ -1,7 +1,11 @@
 // The parts that Poisson points are made of, each against what it must give exactly.
 #include <doctest/doctest.h>
 
+#include <hwy/targets.h>
+
 #include <bit>
+#include <cstring>
+#include <string>
 
 #include "frazil/base/error.h"
 #include "frazil/base/random.h"
@@ -306,4 +310,40 @@ TEST_CASE("poisson points refuse a spacing that is no length") {
     CHECK_THROWS_AS(poisson_points(mesh, std::vector<float>{1.0f}), ValueError);
     CHECK_THROWS_AS(poisson_points(Mesh(), 1.0), ValueError);
     CHECK_THROWS_AS(poisson_points_by_count(mesh, 0), ValueError);
+}
+
+TEST_CASE("every set of instructions makes the same points") {
+    // A ball of slivers and large triangles, and a spacing that varies.
+    Mesh mesh;
+    std::vector<float> spacing;
+    constexpr int kRings = 9, kSectors = 31;
+    for (int i = 0; i <= kRings; ++i) {
+        for (int k = 0; k < kSectors; ++k) {
+            const float a = kPi * float(i) / kRings, b = 2.0f * kPi * float(k) / kSectors;
+            mesh.positions.push_back({std::sin(a) * std::cos(b), std::cos(a), 1.3f * std::sin(a) * std::sin(b)});
+            spacing.push_back(0.03f + 0.02f * float(i) / kRings);
+            const int next = (k + 1) % kSectors;
+            if (i == kRings) continue;
+            mesh.triangles.push_back({i * kSectors + k, (i + 1) * kSectors + k, i * kSectors + next});
+            mesh.triangles.push_back({i * kSectors + next, (i + 1) * kSectors + k, (i + 1) * kSectors + next});
+        }
+    }
+    const auto same = [](const auto& a, const auto& b) {
+        return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
+    };
+    const PointSet even = poisson_points(mesh, 0.05), varying = poisson_points(mesh, spacing);
+    const auto targets = hwy::SupportedAndGeneratedTargets();
+    for (const auto target : targets) {
+        CAPTURE(std::string(hwy::TargetName(target)));
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        const PointSet even_here = poisson_points(mesh, 0.05), varying_here = poisson_points(mesh, spacing);
+        hwy::SetSupportedTargetsForTest(0);
+        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        CHECK(same(even.positions, even_here.positions));
+        CHECK(same(even.areas, even_here.areas));
+        CHECK(same(varying.positions, varying_here.positions));
+        CHECK(same(varying.areas, varying_here.areas));
+    }
+    MESSAGE("sets of instructions compared: " << targets.size());
 }

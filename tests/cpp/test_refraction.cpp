@@ -5,6 +5,7 @@
 #include "chi_square.h"
 #include "frazil/base/quadrature.h"
 #include "frazil/material/transmission.h"
+#include "frazil/render/interior.h"
 #include "frazil/render/render.h"
 #include "frazil/translucency/fresnel.h"
 #include "scenes.h"
@@ -169,6 +170,24 @@ TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) bet
         scene.objects[0].local_to_world[0][0] = -1.0f;
         check(scene);
     }
+    SUBCASE("with normals that point inwards") {
+        for (const V3f& p : scene.meshes[0].positions) scene.meshes[0].normals.values.push_back(V3f(0, 0, -p.z) * 5.0f);
+        scene.meshes[0].normals.interpolation = Interpolation::vertex;
+        check(scene);
+    }
+    SUBCASE("with an edge that four triangles share, a triangle twice and one without area") {
+        Mesh& mesh = scene.meshes[0];
+        const Mesh other = box_of({9, -9, 0.2f}, {20, 9, 0.6f});  // touches the slab along an edge
+        const int first = int(mesh.positions.size());
+        mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+        for (const V3i& t : other.triangles) mesh.triangles.push_back(t + V3i(first));
+        mesh.triangles.push_back({0, 1, 1});
+        const V3i twice = mesh.triangles[0];
+        mesh.triangles.push_back(twice);
+        mesh.triangles.push_back({twice.x, twice.z, twice.y});  // and back, so that it encloses nothing
+        CHECK(is_closed(mesh));
+        check(scene);
+    }
     SUBCASE("cut in two overlapping bodies") {
         scene.meshes.push_back(scene.meshes[0]);
         for (V3f& p : scene.meshes[0].positions) p.z = p.z > 0.0f ? 0.2f : -0.1f;
@@ -325,4 +344,50 @@ TEST_CASE("a matte of ice behind ice has what its core answers for") {
     double sum = 0.0;
     for (const float value : film.layers.at("refracted_matte.behind").pixels) sum += value;
     CHECK(sum / 16 == doctest::Approx(1 - f).epsilon(0.01));
+}
+
+TEST_CASE("the boundary's tint colours what goes through it, each time, and nothing else") {
+    const Rgb tint(0.9f, 0.6f, 0.3f);
+    for (const float eta : {1.0f, 1.31f}) {
+        CAPTURE(eta);
+        Scene scene = scene_of(box_of({-9, -9, -0.2f}, {9, 9, 0.2f}), clear_ice(Rgb(1e-6f), eta, 0.0f));
+        model(scene).translucency = 0.0f;
+        model(scene).refraction_tint = tint;
+        scene.lights = {dome(Rgb(1.0f))};
+        scene.camera.focal_length = 2000.0f;
+        RenderOptions options = small();
+        options.width = options.height = 8;
+        options.samples = 256;
+        options.spacing = 2.0f;
+        const Film film = render(scene, options).film;
+        const double f = eta == 1.0f ? 0.0 : double(fresnel_dielectric(1.0f, eta));
+        for (int c = 0; c < 3; ++c) {
+            // In and out again, with all reflections between.
+            const double through = (1 - f) * (1 - f) / (1 - f * f) * (1 + f);
+            CHECK(mean_inside(film, "refraction", c) ==
+                  doctest::Approx(through * double(tint[c]) * double(tint[c])).epsilon(0.01));
+            CHECK(mean_inside(film, "specular", c) == doctest::Approx(f).epsilon(0.02));
+        }
+    }
+    // Light that comes straight through to a floor is tinted twice as well.
+    Scene scene = scene_of(box_of({-2, 0.5f, -2}, {2, 0.6f, 2}), clear_ice(Rgb(1e-6f), 1.0f, 0.0f));
+    model(scene).translucency = 0.0f;
+    model(scene).refraction_tint = tint;
+    scene.meshes.push_back(floor_square(1.0f, 0.0f));
+    scene.mesh_paths.push_back("/floor");
+    scene.materials.push_back({"/floor", StandardMaterial()});
+    scene.objects.push_back({"/floor", 1, 1, M44f()});
+    scene.lights = {rect_above(1.0f, "")};
+    scene.camera.camera_to_world = M44f();
+    scene.camera.camera_to_world.rotate(V3f(-kPi / 2.0f, 0.0f, 0.0f));
+    scene.camera.camera_to_world[3][1] = 0.3f;
+    scene.camera.focal_length = 40.0f;
+    RenderOptions options = small();
+    options.spacing = 2.0f;
+    options.max_bounces = 0;
+    const Film film = render(scene, options).film;
+    for (int c = 0; c < 2; ++c) {
+        const double ratio = mean_inside(film, "diffuse", c) / mean_inside(film, "diffuse", 2);
+        CHECK(ratio == doctest::Approx(double(tint[c] * tint[c] / (tint[2] * tint[2]))).epsilon(1e-3));
+    }
 }

@@ -106,3 +106,72 @@ TEST_CASE("terminator: a white sphere of few polygons keeps its energy in unifor
     MESSAGE("furnace: " << mean);
     CHECK(mean == doctest::Approx(1.0).epsilon(0.02));
 }
+
+TEST_CASE("normals that turn within the footprint make a sphere as rough as their slopes over it") {
+    const float radius = 2.0f, footprint = 0.05f;
+    Scene scene = scene_of(sphere(radius, 5), white_diffuse());
+    const RayScene rays(scene.meshes, {{0, M44f()}});
+    const SurfaceResolver resolver(scene);
+    for (const float x : {0.0f, 0.9f, 1.6f, 1.85f}) {
+        CAPTURE(x);
+        const Ray ray{V3f(x, 0.13f, 6.0f), V3f(0, 0, -1)};
+        Hit hit;
+        REQUIRE(rays.intersect(ray, hit));
+        // The footprint's half axes turn the normal by themselves over the radius.
+        const float cosine = hit.geometric_normal.z;
+        const float expected = footprint / radius * std::sqrt(0.5f + 0.5f / (cosine * cosine));
+        CHECK(resolver.resolve(hit, ray.direction, footprint).normal_spread == doctest::Approx(expected).epsilon(0.03));
+        CHECK(resolver.resolve(hit, ray.direction, 0.0f).normal_spread == 0.0f);
+    }
+    scene.meshes[0].normals = {};
+    Hit hit;
+    REQUIRE(rays.intersect({V3f(0.9f, 0.13f, 6.0f), V3f(0, 0, -1)}, hit));
+    CHECK(SurfaceResolver(scene).resolve(hit, V3f(0, 0, -1), footprint).normal_spread == 0.0f);
+}
+
+TEST_CASE("a shiny bumpy surface seen from afar has no sparks: few samples agree with many") {
+    // Ripples of a few triangles each, much finer than a pixel, under a lamp.
+    Mesh mesh;
+    constexpr int kSide = 120;
+    for (int j = 0; j <= kSide; ++j) {
+        for (int i = 0; i <= kSide; ++i) {
+            const float x = 4.0f * (float(i) / kSide - 0.5f), y = 4.0f * (float(j) / kSide - 0.5f);
+            mesh.positions.emplace_back(x, y, 0.02f * std::sin(40.0f * x) * std::sin(37.0f * y));
+        }
+    }
+    for (int j = 0; j < kSide; ++j) {
+        for (int i = 0; i < kSide; ++i) {
+            const int a = j * (kSide + 1) + i;
+            mesh.triangles.insert(mesh.triangles.end(), {{a, a + 1, a + kSide + 2}, {a, a + kSide + 2, a + kSide + 1}});
+        }
+    }
+    std::vector<V3f> normals(mesh.positions.size(), V3f(0.0f));
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const V3f cross(triangle_cross(mesh, t));
+        for (int k = 0; k < 3; ++k) normals[std::size_t(mesh.triangles[t][k])] += cross;
+    }
+    for (V3f& n : normals) n.normalize();
+    mesh.normals = {normals, Interpolation::vertex};
+    Material shiny = white_diffuse();
+    std::get<StandardMaterial>(shiny.model).metallic.value = 1.0f;
+    std::get<StandardMaterial>(shiny.model).roughness.value = 0.05f;
+    Scene scene = scene_of(mesh, shiny);
+    scene.lights = {sun_from_x()};
+    scene.lights[0].light_to_world = M44f();
+    scene.lights[0].light_to_world.rotate(V3f(0.0f, 0.4f, 0.0f));
+    const auto spread = [&](const Scene& seen) {
+        RenderOptions options = small();
+        options.samples = 4;
+        const Film film = render(seen, options).film;
+        double sum = 0.0, sum2 = 0.0;
+        int count = 0;
+        for (int y = 6; y < 18; ++y) {
+            for (int x = 6; x < 18; ++x, ++count) {
+                const double value = double(pixel(film, "specular", x, y)[0]);
+                sum += value, sum2 += value * value;
+            }
+        }
+        return std::sqrt(sum2 / count - sum * sum / count / count) / (sum / count);
+    };
+    CHECK(spread(scene) < 0.4);  // 5.6 without
+}

@@ -9,6 +9,7 @@ from test_usd_materials import COLOR, FLOAT, TOKEN, bind
 from usd_stages import add_quad, load, new_stage
 
 import frazil as fz
+from frazil import optics
 from frazil.ice import ICE_PRESETS, presets_markdown
 from frazil.usd.material_inputs import ICE_INPUTS, OVERLAY_INPUTS, find_input, inputs_markdown
 
@@ -44,11 +45,32 @@ def test_presets_scale_lengths_and_coefficients(name):
         assert b.opacity == a.opacity
 
 
+@pytest.mark.parametrize(
+    ("name", "impurities"),
+    [
+        ("fresh_breath", {}),
+        ("arctic_blue", {}),
+        ("old_glacier", {}),
+        ("weathered_white", {}),
+        ("sea_ice", {"dust": 1e-7, "algae": 2e-9}),
+    ],
+)
+def test_presets_absorb_as_ice_does_per_metre(name, impurities):
+    """Within 3 % of pure ice by Warren and Brandt with these impurities; `depth` multiplies that."""
+    medium = optics.ice(0.0, 0.0, **impurities)
+    np.testing.assert_allclose(fz.ice_preset(name).medium.sigma_a, medium.sigma_a, rtol=0.03)
+    np.testing.assert_allclose(fz.ice_preset(name, depth=8.0).medium.sigma_a, 8 * np.array(medium.sigma_a), rtol=0.03)
+    # As deep as it is large: real ice at any size.
+    np.testing.assert_allclose(fz.ice_preset(name, scale=5, depth=5).medium.sigma_a, medium.sigma_a, rtol=0.03)
+
+
 def test_unknown_presets_name_the_nearest():
     with pytest.raises(KeyError, match="Did you mean 'arctic_blue'"):
         fz.ice_preset("artic_blue")
     with pytest.raises(ValueError, match="scale must be > 0"):
         fz.ice_preset("sea_ice", scale=0.0)
+    with pytest.raises(ValueError, match="depth must be >= 0, got -1"):
+        fz.ice_preset("sea_ice", depth=-1.0)
 
 
 def test_the_presets_are_those_of_the_shader():
@@ -77,6 +99,7 @@ def test_a_preset_gives_what_is_not_authored(stage):
     ice = bind(stage, add_quad(stage, "/Quad"), "frazil:ice")
     ice.CreateInput("preset", TOKEN).Set("old_glacier")
     ice.CreateInput("age", FLOAT).Set(0.75)
+    ice.CreateInput("preset_depth", FLOAT).Set(3.0)
     ice.CreateInput("eta", FLOAT).Set(1.33)
     ice.CreateInput("sigma_a", COLOR).Set(Gf.Vec3f(0.01, 0.02, 0.03))
     add_overlay(stage, ice, "dust", pattern=(TOKEN, "snow"))

@@ -111,10 +111,30 @@ def test_too_many_points_are_refused_with_a_spacing_that_works():
 
 
 def test_needles_do_not_slip_past_the_prediction():
-    # No area to speak of, but length without end.
-    needle = np.array([[0, 0, 0], [1e6, 0, 0], [0, 1e-12, 0]], np.float32)
+    # No area to speak of, but length without end: one point covers at most two spacings of it.
+    needle = np.array([[0, 0, 0], [1e11, 0, 0], [0, 1e-11, 0]], np.float32)
+    mesh = fz.Mesh(needle, np.array([[0, 1, 2]], np.int32))
+    with pytest.raises(ValueError, match="spacing must be >= .* by the memory that is free"):
+        fz.poisson_points(mesh, 0.1)
+    with pytest.raises(ValueError, match="by max_points") as caught:
+        fz.poisson_points(mesh, 0.1, max_points=1000)
+    remedy = float(str(caught.value).split(">= ")[1].split(",")[0])
+    assert 500 < len(fz.poisson_points(mesh, remedy, max_points=1000)) < 2000
+    assert len(fz.poisson_points(mesh, count=1000)) == pytest.approx(1000, rel=0.005)
+    # Many that are only together too long.
+    start = np.random.default_rng(0).random((3000, 1, 3)) * 5
+    needles = (start + np.array([[0, 0, 0], [1, 0, 0], [0, 1e-12, 0]])).astype(np.float32).reshape(-1, 3)
+    needles[2::3] = needles[0::3] + np.float32([0, 1e-6, 0])
     with pytest.raises(ValueError, match="long thin triangles"):
-        fz.poisson_points(fz.Mesh(needle, np.array([[0, 1, 2]], np.int32)), 1e-3, max_points=1000)
+        fz.poisson_points(fz.Mesh(needles, np.arange(9000, dtype=np.int32).reshape(-1, 3)), 1e-3, max_points=2000)
+
+
+def test_areas_of_a_count_are_those_of_its_spacing():
+    mesh = fz.Mesh(*mesh_of(trimesh.creation.torus(1.0, 0.4)))
+    counted = fz.poisson_points(mesh, count=5000)
+    spaced = fz.poisson_points(mesh, counted.spacing)
+    assert counted.positions.tobytes() == spaced.positions.tobytes()
+    np.testing.assert_allclose(counted.areas, spaced.areas, rtol=1e-4)
 
 
 def test_tessellated_points_are_the_regular_cut():

@@ -1,5 +1,7 @@
 """Points that ride on a moving mesh: ids, true areas on every pose, rest poses from Python, USD and in renders."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -234,6 +236,53 @@ def textured_ice(tmp_path, stage, mesh):
     image.CreateInput("wrapS", Sdf.ValueTypeNames.Token).Set("clamp")
     shader.GetInput("spacing").ClearSources()
     shader.CreateInput("spacing", Sdf.ValueTypeNames.Float).ConnectToSource(image.ConnectableAPI(), "r")
+
+
+def test_a_bake_takes_pixels_as_the_render_does(tmp_path, capsys):
+    from frazil.cli import main
+
+    stage = moving_stage(tmp_path / "a.usda")
+    plate(stage)
+    UsdGeom.Xformable(stage.GetPrimAtPath("/Camera")).AddTranslateOp().Set((0, 0.5, 0.2))
+    stage.GetPrimAtPath("/Look/Ice").GetAttribute("inputs:spacing").Set(0.02)
+    stage.GetRootLayer().Save()
+    scene, cache, pixels = str(tmp_path / "a.usda"), str(tmp_path / "a.bake"), ["--spacing-pixels", "8"]
+    some = ["--bake-samples", "1", "--bake-bounces", "0", "--progress", "none"]
+    seen = ["--camera", "/Camera", "--resolution", "64x36"]
+    assert main(["bake", scene, "-o", str(tmp_path / "all.bake"), *some]) == 0
+    assert main(["bake", scene, "-o", cache, *some, *pixels, *seen]) == 0
+    every, few = (int(line.split(": ")[2].split()[0]) for line in capsys.readouterr().out.splitlines())
+    assert 100 < few < 0.5 * every
+    # The render finds what it would have made.
+    made = Path(cache).read_bytes()
+    render = ["render", scene, "-o", str(tmp_path / "a.exr"), "--bake-cache", cache, "--samples", "1"]
+    assert main([*render, *some, *pixels, *seen]) == 0
+    assert Path(cache).read_bytes() == made
+    assert main(["bake", scene, "-o", cache, "--spacing-pixels", "-1"]) == 2
+    assert main(["bake", scene, "-o", cache, "--resolution", "wide"]) == 2
+
+
+def test_texture_spacing_is_read_between_the_vertices(tmp_path):
+    import OpenImageIO as oiio
+
+    # Fine in a stripe that no vertex of the plate's two triangles touches.
+    stage = moving_stage(tmp_path / "a.usda")
+    mesh, _ = plate(stage, 1)
+    textured_ice(tmp_path, stage, mesh)
+    stripe = np.full((4, 64, 1), 0.08, np.float32)
+    stripe[:, 24:40] = 0.02
+    assert oiio.ImageBuf(stripe).write(str(tmp_path / "spacing.exr"))
+    points = fz.bake(load(stage), bake_samples=1, bake_bounces=0).points(0)
+    x = points.positions[:, 0]
+    within, left = ((x > 0.4) & (x < 0.6)).sum(), (x < 0.2).sum()
+    assert 12 < within / left < 20  # (0.08 / 0.02)², less at the border
+    assert points.areas.sum(dtype="f8") == pytest.approx(1, rel=1e-4)
+    # They are named by the mesh's own triangles.
+    assert set(points.triangles) == {0, 1}
+    u, v = points.barycentrics.T
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])[[[0, 1, 2], [0, 2, 3]]][points.triangles]
+    rebuilt = corners[:, 0] * (1 - u - v)[:, None] + corners[:, 1] * u[:, None] + corners[:, 2] * v[:, None]
+    np.testing.assert_allclose(rebuilt, points.positions[:, :2], atol=1e-6)
 
 
 def plate(stage, n=24):

@@ -54,6 +54,29 @@ def test_shells_inside_each_other():
     check_guarantees(both, np.concatenate([triangles, triangles + len(positions)]), 0.15)
 
 
+def test_edges_that_many_faces_share_and_vertices_without_faces():
+    # A book of seven pages on one spine, some of them turned over, whose pages cross a sheet; and stray vertices.
+    angles = np.linspace(0.1, 2.9, 7)
+    pages = np.stack([np.cos(angles), np.sin(angles), np.zeros(7)], axis=1)
+    spine = np.array([[0, 0, -1], [0, 0, 1]])
+    sheet = np.array([[-2, 0.3, -1], [2, 0.3, -1], [0, 0.3, 2]])
+    positions = np.concatenate([spine, pages, sheet, np.full((5, 3), 7.0)]).astype(np.float32)
+    faces = [[0, 1, 2 + i] if i % 2 else [1, 0, 2 + i] for i in range(7)] + [[9, 10, 11], [0, 0, 1], [2, 3, 3]]
+    check_guarantees(positions, np.array(faces, np.int32), 0.05)
+
+
+def test_a_spacing_far_larger_than_each_of_many_shells_gives_each_its_points():
+    shells, count = [], 5
+    for i in range(count):
+        positions, triangles = mesh_of(trimesh.creation.icosphere(1, radius=1e-3))
+        shells.append((positions + np.float32([10 * i, 0, 0]), triangles + i * len(positions)))
+    positions, triangles = (np.concatenate(x) for x in zip(*shells, strict=True))
+    points = check_guarantees(positions, triangles.astype(np.int32), 1.0)
+    per_shell = np.bincount(np.round(points.positions[:, 0] / 10).astype(int), minlength=count)
+    assert (per_shell >= 1).all()
+    assert (per_shell <= 8).all()
+
+
 def test_sliver_of_aspect_a_million():
     positions = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1e-6, 0], [0.5, 0.3, 0]], np.float32)
     check_guarantees(positions, np.array([[0, 1, 2], [0, 1, 3]], np.int32), 0.05)

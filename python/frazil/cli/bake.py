@@ -5,7 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .checks import misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
+from .checks import checked_resolution, misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
+from .frames import authored_resolution
 from .progress import PROGRESS_KINDS, make_progress
 
 __all__ = ["bake_command"]
@@ -16,6 +17,13 @@ def bake_command(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE.bake", help="The file; what in it still holds is kept.")
     ],
+    camera: Annotated[
+        str | None, typer.Option(metavar="PATH", help="Prim path of the camera that --spacing-pixels is for.")
+    ] = None,
+    resolution: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Pixels of --spacing-pixels. Default: the stage's, else 960x540."),
+    ] = None,
     frame: Annotated[
         float | None, typer.Option(metavar="F", help="Time code to bake. Default: the stage's default values.")
     ] = None,
@@ -29,6 +37,9 @@ def bake_command(
         float, typer.Option(metavar="METRES", help="Between translucency points. 0 = by material.")
     ] = 0.0,
     spacing_scale: Annotated[float, typer.Option(metavar="FACTOR", help="Multiplies every spacing.")] = 1.0,
+    spacing_pixels: Annotated[
+        float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels of the camera.")
+    ] = 0.0,
     bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
     bake_error: Annotated[
         float,
@@ -56,6 +67,8 @@ def bake_command(
     positive("--bake-error", bake_error, may_be_zero=True)
     positive("--spacing-scale", spacing_scale)
     positive("--spacing", spacing, may_be_zero=True)
+    positive("--spacing-pixels", spacing_pixels, may_be_zero=True)
+    size = None if resolution is None else checked_resolution(resolution)
     within("--threads", threads, 0, 4096)
     within("--seed", seed, 0, 2**32 - 1)
     within("--bake-samples", bake_samples, 1, 2**20)
@@ -73,6 +86,7 @@ def bake_command(
         "threads": threads,
         "spacing": spacing,
         "spacing_scale": spacing_scale,
+        "spacing_pixels": spacing_pixels,
         "bake_samples": bake_samples,
         "bake_error": bake_error,
         "translucent_shadows": translucent_shadows,
@@ -81,8 +95,9 @@ def bake_command(
         "estimator": estimator,
     }
     with make_progress("none" if quiet and progress == "bar" else progress, 1) as reporter:
-        loaded = load_usd(scene, frame=frame, rest_frame=rest_frame)
+        loaded = load_usd(scene, frame=frame, camera=camera, rest_frame=rest_frame)
         reporter("load", 1.0)
+        options["width"], options["height"] = size or authored_resolution(loaded)
         bake, report = refresh_bake(loaded, output, options, reporter)
     if not quiet:
         count = sum(len(bake.points(i)) for i in range(len(bake)))

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import typer
 
-__all__ = ["misused", "one_of", "positive", "refuse_unreadable", "refuse_unwritable", "within"]
+from .frames import parse_resolution
+
+__all__ = ["checked_resolution", "misused", "one_of", "positive", "refuse_unreadable", "refuse_unwritable", "within"]
 
 
 def misused(option: str, message: str) -> typer.BadParameter:
@@ -31,6 +33,14 @@ def positive(option: str, value: float, may_be_zero: bool = False) -> None:
 def within(option: str, value: int, low: int, high: int) -> None:
     if not low <= value <= high:
         raise misused(option, f"must be from {low} to {high}, got {value}.")
+
+
+def checked_resolution(text: str) -> tuple[int, int]:
+    """`--resolution` as (width, height)."""
+    try:
+        return parse_resolution(text)
+    except ValueError as error:
+        raise misused("--resolution", str(error)) from None
 
 
 def refuse_unreadable(scene: Path) -> None:

@@ -7,9 +7,11 @@ Not: views and other tokens.
 
 import re
 from pathlib import Path
+from typing import Any
 
-__all__ = ["fill_pattern", "has_pattern", "parse_frames", "parse_resolution"]
+__all__ = ["authored_resolution", "fill_pattern", "has_pattern", "parse_frames", "parse_resolution"]
 
+DEFAULT_RESOLUTION = (960, 540)
 MAX_SIZE = 65536
 MAX_FRAMES = 1_000_000
 
@@ -25,6 +27,12 @@ def parse_resolution(text: str) -> tuple[int, int]:
     if not (1 <= width <= MAX_SIZE and 1 <= height <= MAX_SIZE):
         raise ValueError(f"must be from 1x1 to {MAX_SIZE}x{MAX_SIZE}, got '{text}'.")
     return width, height
+
+
+def authored_resolution(scene: Any) -> tuple[int, int]:
+    """The resolution that a loaded stage's render settings ask for, else the default."""
+    settings = scene.render_settings
+    return (settings and settings.product.resolution) or DEFAULT_RESOLUTION
 
 
 def parse_frames(text: str) -> list[int]:

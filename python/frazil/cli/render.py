@@ -10,13 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from ..warning import FrazilWarning
-from .checks import misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
-from .frames import fill_pattern, has_pattern, parse_frames, parse_resolution
+from .checks import checked_resolution, misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
+from .frames import authored_resolution, fill_pattern, has_pattern, parse_frames
 from .progress import PROGRESS_KINDS, make_progress
 
 __all__ = ["render_command"]
-
-DEFAULT_RESOLUTION = (960, 540)
 
 
 def render_command(
@@ -136,12 +134,7 @@ def render_command(
 ) -> None:
     """Render a USD stage to a layered OpenEXR and a PNG preview."""
     # What can be refused without reading the scene is refused first.
-    size = None
-    if resolution is not None:
-        try:
-            size = parse_resolution(resolution)
-        except ValueError as error:
-            raise misused("--resolution", str(error)) from None
+    size = None if resolution is None else checked_resolution(resolution)
     from ..image import COMPRESSIONS
     from ..rendering import ESTIMATORS
 
@@ -220,7 +213,7 @@ def render_command(
                 saved = _checkpoint_of(exr)
                 options |= {"checkpoint": saved, "resume": resume and saved.exists()}
                 options["checkpoint_minutes"] = 10.0 if checkpoint is None else checkpoint
-            film = render_scene(loaded, resolution=size or _authored_resolution(loaded), progress=reporter, **options)
+            film = render_scene(loaded, resolution=size or authored_resolution(loaded), progress=reporter, **options)
 
             start = time.perf_counter()
             film.save(
@@ -325,12 +318,6 @@ def _jobs(
 
 def _checkpoint_of(exr: Path) -> Path:
     return exr.with_suffix(".checkpoint")
-
-
-def _authored_resolution(loaded: Any) -> tuple[int, int]:
-    """The resolution that the stage's render settings ask for, else the default."""
-    settings = loaded.render_settings
-    return (settings and settings.product.resolution) or DEFAULT_RESOLUTION
 
 
 # Names that other renderers' render vars have for our layers.

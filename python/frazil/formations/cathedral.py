@@ -91,7 +91,7 @@ def cathedral(
     )
     parts = [Part.of("Ice", surface, "Ice", "ice", 50.0)]
     parts += _rocks(rng, hall, int(rocks), seed)
-    image, lights = sky_and_lights(seed, _SUN, sun_light=17.0, sky_light=3.2)
+    image, lights = sky_and_lights(seed, _SUN, sun_light=9.0, sky_light=1.7)
     return Formation(
         "cathedral",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, columns=columns, opening=opening,

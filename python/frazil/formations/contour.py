@@ -47,14 +47,19 @@ class Surface:
         return Surface(self.positions[kept], (np.cumsum(kept) - 1)[self.triangles[kept[self.triangles[:, 0]]]])
 
     def sharpen(self, tips: np.ndarray, reach: float) -> None:
-        """Pull the vertex nearest to each of the tips (K, 3) onto it, where that is within `reach` and makes a tip."""
+        """Pull the vertex nearest to each of the tips (K, 3) onto it, where that is within `reach`, makes a tip and
+        has no other tip beside it."""
         distance, nearest = cKDTree(self.positions).query(tips)
+        pulled = np.zeros(len(self.positions), bool)
         for vertex, tip in zip(nearest[distance < reach], tips[distance < reach], strict=True):
             fan = self.triangles[(self.triangles == vertex).any(1)]
+            if pulled[fan].any():
+                continue
             ends = self.positions[fan[fan != vertex].reshape(-1, 2)] - tip
             ends /= np.linalg.norm(ends, axis=2, keepdims=True)
             if np.arccos(np.clip(np.sum(ends[:, 0] * ends[:, 1], 1), -1.0, 1.0)).sum() < kSharp * 2.0 * np.pi:
                 self.positions[vertex] = tip
+                pulled[vertex] = True
 
 
 def contour(field: Field, lower, upper, cell: float) -> Surface:

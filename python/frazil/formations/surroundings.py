@@ -14,14 +14,16 @@ from .solids import boulder, kUp
 from .weathering import grow
 
 kDeep, kShallow = np.array([0.010, 0.030, 0.042]), np.array([0.07, 0.30, 0.33])
+kDeepest = 8.0  # metres of ice that a body shows in colour, however large it is: more would be dark
 kSnow = MaterialRow("UsdPreviewSurface", {"diffuseColor": (0.84, 0.88, 0.93), "roughness": 0.7, "ior": 1.31})
 kRock = MaterialRow("UsdPreviewSurface", {"roughness": 0.45, "ior": 1.5}, uses_colors=True)
 kWater = MaterialRow("UsdPreviewSurface", {"roughness": 0.08, "ior": 1.33}, uses_colors=True)
 
 
 def ice(preset: str, age: float, size: float, **inputs) -> MaterialRow:
-    """frazil:ice of a preset, for a body of `size` metres."""
-    return MaterialRow("frazil:ice", {"preset": preset, "preset_scale": float(size), "age": float(age), **inputs})
+    """frazil:ice of a preset, for a body of `size` metres: its real absorption up to a depth of kDeepest metres."""
+    row = {"preset": preset, "preset_scale": float(size), "preset_depth": min(float(size), kDeepest), "age": float(age)}
+    return MaterialRow("frazil:ice", row | inputs)
 
 
 def sky_and_lights(seed: int, sun, width: int = 512, sun_light: float = 4.4, sky_light: float = 0.9):

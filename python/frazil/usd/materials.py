@@ -139,12 +139,12 @@ class MaterialReader:
             self._shaders, shader, ICE_INPUTS, frozenset((*OVERLAY_SLOTS, "density")), (_OVERLAY_PREFIX,)
         )
         values = read.values
-        name, scale = values.pop("preset"), values.pop("preset_scale")
+        name, scale, depth = (values.pop(key) for key in ("preset", "preset_scale", "preset_depth"))
         preset = find_preset(name) if name != "none" else None
         if preset is not None:
             values |= {key: value for key, value in preset.inputs.items() if key not in read.authored}
 
-        medium = self._read_medium(path, read.authored, values, preset, scale)
+        medium = self._read_medium(path, read.authored, values, preset, (scale, depth))
         overlays = preset_overlays(preset, scale, direction=self._up()) if preset is not None else []
         authored, masks = self._read_overlays(shader)
         values["ramp_distances"], values["ramp_colors"] = self._check_ramp(
@@ -159,7 +159,7 @@ class MaterialReader:
         )
         return model, texcoord_name(self._context, path, [*read.expressions.values(), *masks])
 
-    def _read_medium(self, path, authored: set[str], values, preset, scale: float) -> Medium:
+    def _read_medium(self, path, authored: set[str], values, preset, size: tuple[float, float]) -> Medium:
         has_sigma = bool(authored & {"sigma_s_prime", "sigma_a"})
         has_albedo = bool(authored & {"albedo", "mean_free_path"})
         if has_sigma and has_albedo:
@@ -167,7 +167,7 @@ class MaterialReader:
                 path, "has both albedo or mean_free_path and sigma_s_prime or sigma_a. The sigmas are used."
             )
         if preset is not None and not has_albedo:
-            medium = preset_medium(preset, scale, values["eta"])
+            medium = preset_medium(preset, *size, values["eta"])
             return Medium(
                 values["sigma_s_prime"] or medium.sigma_s_prime, values["sigma_a"] or medium.sigma_a, values["eta"]
             )

@@ -286,10 +286,10 @@ class SurfaceModelReader:
         eta = float(np.clip(self._number("ior"), 1.0, 4.0))
         unit = self._context.meters_per_unit
         if is_transmission:
-            medium, tint = self._transmitting(unit, eta), (1.0, 1.0, 1.0)
+            (medium, boundary_tint), tint = self._transmitting(unit, eta), (1.0, 1.0, 1.0)
             scatters = max(medium.sigma_s_prime) > 10 * _SMALLEST_SCATTERING
         else:
-            medium, tint = self._scattering(unit, eta, row["tint"])
+            (medium, tint), boundary_tint = self._scattering(unit, eta, row["tint"]), (1.0, 1.0, 1.0)
             scatters = True
         for role in ("coat", "emission"):
             if _largest(self._get(role)) > 0.0:
@@ -310,6 +310,7 @@ class SurfaceModelReader:
             translucency=1.0 if scatters else 0.0,
             refraction=1.0 if is_transmission else 0.0,
             refraction_roughness=refraction_roughness,
+            refraction_tint=boundary_tint,
             overlays=self._rest(transmission if is_transmission else subsurface),
             tint=tint,
             normal=self._normal(),
@@ -330,20 +331,19 @@ class SurfaceModelReader:
         mask = cover.to_lookup(self._context, self._path, 1)
         return [] if mask is None else [Overlay(**layer, roughness=roughness, mask=mask)]
 
-    def _transmitting(self, unit: float, eta: float) -> Medium:
+    def _transmitting(self, unit: float, eta: float) -> tuple[Medium, tuple[float, float, float]]:
+        """The medium, and the tint of its boundary: without a depth the color is the boundary's."""
         color = np.clip(np.resize(self._mean("transmission_color"), 3), 1e-4, 1.0)
         depth = self._number("transmission_depth") * unit
         scatter = np.clip(np.resize(self._mean("transmission_scatter"), 3), 0.0, None)
         if depth <= 0.0:
-            if not is_close(color, 1.0):
-                self._lost.append(f"{self._model.transmission_color} without {self._model.transmission_depth}")
-            return Medium([_SMALLEST_SCATTERING] * 3, [0.0] * 3, eta)
+            return Medium([_SMALLEST_SCATTERING] * 3, [0.0] * 3, eta), tuple(color.tolist())
         extinction, sigma_s = -np.log(color) / depth, scatter / depth
         sigma_a = extinction - sigma_s
         sigma_a = sigma_a - min(0.0, float(sigma_a.min()))
         forward = float(np.clip(self._number("transmission_anisotropy"), -0.95, 0.95))
         reduced = np.maximum(sigma_s * (1.0 - forward), _SMALLEST_SCATTERING)
-        return Medium(reduced.tolist(), sigma_a.tolist(), eta)
+        return Medium(reduced.tolist(), sigma_a.tolist(), eta), (1.0, 1.0, 1.0)
 
     def _scattering(self, unit: float, eta: float, tint_row: MaterialInput):
         color = self._get("subsurface_color").widened(3)

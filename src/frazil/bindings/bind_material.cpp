@@ -335,6 +335,7 @@ void bind_ice(nb::module_& module) {
         "specular, translucency : weights in [0, 1] of the reflection and of the core.\n"
         "refraction : how much of what the medium leaves unscattered is seen through the boundary, in [0, 1].\n"
         "refraction_roughness : of light that goes through the boundary, in [0, 1]; None = as roughness.\n"
+        "refraction_tint : RGB factor in [0, 1] on light each time that it goes through the boundary unscattered.\n"
         "volume : how much of the light scattered once inside is traced, in [0, 1].\n"
         "anisotropy : g of that light, in [-0.95, 0.95].\n"
         "density : Density, by which the medium is multiplied along refracted rays, from place to place.\n"
@@ -355,11 +356,11 @@ void bind_ice(nb::module_& module) {
         "__init__",
         [](IceMaterial* self, const Medium& medium, const std::string& profile, const FloatInput& roughness,
            float specular, float translucency, float refraction, const std::optional<float>& refraction_roughness,
-           float volume, float anisotropy, const Density& density, int priority, const std::vector<Overlay>& overlays,
-           float age, const ColorInput& tint, const std::vector<float>& ramp_distances,
-           const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy, const std::string& compensation,
-           float compensation_limit, float compensation_strength, const FloatInput& spacing,
-           const std::optional<TextureLookup>& normal, const FloatInput& bump) {
+           const Triple& refraction_tint, float volume, float anisotropy, const Density& density, int priority,
+           const std::vector<Overlay>& overlays, float age, const ColorInput& tint,
+           const std::vector<float>& ramp_distances, const std::vector<Triple>& ramp_colors, bool ramp_preserve_energy,
+           const std::string& compensation, float compensation_limit, float compensation_strength,
+           const FloatInput& spacing, const std::optional<TextureLookup>& normal, const FloatInput& bump) {
             IceMaterial model;
             model.medium = medium;
             model.roughness = to_input(roughness);
@@ -367,6 +368,7 @@ void bind_ice(nb::module_& module) {
             model.translucency = translucency;
             model.refraction = refraction;
             model.refraction_roughness = refraction_roughness.value_or(model.refraction_roughness);
+            model.refraction_tint = to_v3f(refraction_tint);
             model.volume = volume;
             model.anisotropy = anisotropy;
             model.density = density;
@@ -386,8 +388,8 @@ void bind_ice(nb::module_& module) {
         },
         "medium"_a, nb::kw_only(), "profile"_a = "multiple_scattering", "roughness"_a = FloatInput(0.1f),
         "specular"_a = 1.0f, "translucency"_a = 1.0f, "refraction"_a = 1.0f, "refraction_roughness"_a = nb::none(),
-        "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "density"_a = Density(), "priority"_a = 0,
-        "overlays"_a = std::vector<Overlay>(), "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}),
+        "refraction_tint"_a = Triple{1, 1, 1}, "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "density"_a = Density(),
+        "priority"_a = 0, "overlays"_a = std::vector<Overlay>(), "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}),
         "ramp_distances"_a = std::vector<float>(), "ramp_colors"_a = std::vector<Triple>(),
         "ramp_preserve_energy"_a = false, "compensation"_a = "depth", "compensation_limit"_a = 8.0f,
         "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f), "normal"_a = nb::none(),
@@ -410,6 +412,9 @@ void bind_ice(nb::module_& module) {
                 model.refraction_roughness = value.value_or(-1.0f);
             },
             "value"_a.none())
+        .def_prop_rw(
+            "refraction_tint", [](const IceMaterial& model) { return from_v3f(model.refraction_tint); },
+            [](IceMaterial& model, const Triple& tint) { model.refraction_tint = to_v3f(tint); })
         .def_rw("volume", &IceMaterial::volume)
         .def_rw("anisotropy", &IceMaterial::anisotropy)
         .def_rw("density", &IceMaterial::density)

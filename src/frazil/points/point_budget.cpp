@@ -37,13 +37,13 @@ double point_limit(std::uint64_t max_points) {
     return std::min(available_memory() / kBytesPerPoint, kMostPoints);
 }
 
-void check_budget(double points, std::uint64_t max_points, const char* name, double value) {
+void check_budget(double points, int dimension, std::uint64_t max_points, const char* name, double value) {
     const double limit = point_limit(max_points);
     if (points <= limit) return;
     // Rounded up, so that the remedy as printed is enough.
-    throw ValueError(str("Mesh: ", name, " must be >= ", value * std::sqrt(points / limit) * 1.01, ", got ", value,
-                         ". It would take about ", points, " points and ", points * kBytesPerPoint / 1e9, " GB, and ",
-                         limit, " points are allowed",
+    throw ValueError(str("Mesh: ", name, " must be >= ", value * std::pow(points / limit, 1.0 / dimension) * 1.01,
+                         ", got ", value, ". It would take about ", points, " points and ",
+                         points * kBytesPerPoint / 1e9, " GB, and ", limit, " points are allowed",
                          max_points > 0 ? " by max_points." : " by the memory that is free."));
 }
 

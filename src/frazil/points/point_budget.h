@@ -20,7 +20,8 @@ double available_memory();
 // How many points may be made: `max_points`, or what fits into memory where that is 0.
 double point_limit(std::uint64_t max_points);
 
-// ValueError of the form "Mesh: <name> must be >= <the smallest that fits>, got ..." where `points` exceeds the limit.
-void check_budget(double points, std::uint64_t max_points, const char* name, double value);
+// ValueError of the form "Mesh: <name> must be >= <the smallest that fits>, got ..." where `points` exceeds the limit. Their
+// number goes as 1 / value to the power of `dimension`: 2 on surfaces, 1 along what is much longer than wide.
+void check_budget(double points, int dimension, std::uint64_t max_points, const char* name, double value);
 
 }  // namespace frazil

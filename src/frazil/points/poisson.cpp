@@ -1,6 +1,7 @@
 #include "frazil/points/poisson.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for_each.h>
 
 #include <atomic>
 #include <stdexcept>
@@ -20,12 +21,14 @@ constexpr double kTileWidth = 32.0;
 constexpr double kLeastTileWidth = 6.0;  // in the largest spacings, so that tiles of one colour stay apart
 constexpr std::size_t kTriangleGrain = 4096;
 
-// The area, and the integral of 1 / spacing² over it, which tells the number of points.
+// The area, and the integral of 1 / spacing² over it, which tells the number of points; the square of the longest edge,
+// in spacings: no point covers more than two of it.
 struct Extent {
-    double area = 0.0, spacings2 = 0.0;
+    double area = 0.0, spacings2 = 0.0, longest2 = 0.0;
     Extent& operator+=(const Extent& other) {
         area += other.area;
         spacings2 += other.spacings2;
+        longest2 = std::max(longest2, other.longest2);
         return *this;
     }
 };
@@ -41,7 +44,11 @@ Extent measure(const Mesh& mesh, const SpacingField& spacing) {
             const double m = (a + b + c) / 3.0;
             const double mean =
                 spacing.per_vertex ? 0.75 / (m * m) + (1 / (a * a) + 1 / (b * b) + 1 / (c * c)) / 12.0 : 1.0 / (a * a);
-            sum += {area, area * mean};
+            const V3d corner(mesh.positions[t.x]);
+            const double edge2 =
+                std::max((V3d(mesh.positions[t.y]) - corner).length2(), (V3d(mesh.positions[t.z]) - corner).length2());
+            const double largest = std::max(a, std::max(b, c));
+            sum += {area, area * mean, area > 0.0 ? edge2 / (largest * largest) : 0.0};
         }
         return sum;
     });
@@ -53,8 +60,21 @@ std::size_t point_count(const PointsInTiles& points) {
     return sum;
 }
 
-PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double largest, const PoissonOptions& options,
-                           Progress* progress) {
+using TileFillers = oneapi::tbb::enumerable_thread_specific<TileFiller>;
+
+// Add the areas that wait for later tiles.
+void share_borders(PointsInTiles& points, TileFillers& fillers, Progress* progress) {
+    const std::size_t count = points.grid.count();
+    std::atomic<std::size_t> done = 0;
+    parallel_for(count, 4, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) fillers.local().share_border(i);
+        if (progress) progress->update("areas", double(done += end - begin) / double(count));
+    });
+}
+
+// The points and, if `with_areas`, their areas; else share_borders() adds these.
+PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double largest, bool with_areas,
+                           const PoissonOptions& options, Progress* progress) {
     const Box3f box = bounds(mesh);
     // A spacing beyond the mesh's size asks for the same points as its size does, and keeps numbers tame.
     const double diagonal = mesh.positions.empty() ? 0.0 : (V3d(box.max) - V3d(box.min)).length();
@@ -67,11 +87,12 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
         throw ValueError(str("Mesh: area must be > 0, got ", mesh.triangles.size(),
                              " triangles without area. Points need a surface."));
     }
-    check_budget(kPointsPerSpacing2 * extent.spacings2, options.max_points, "spacing", asked);
+    check_budget(kPointsPerSpacing2 * extent.spacings2, 2, options.max_points, "spacing", asked);
+    check_budget(0.5 * std::sqrt(extent.longest2), 1, options.max_points, "spacing", asked);
 
     const double unit = spacing.per_vertex ? std::sqrt(extent.area / extent.spacings2) : spacing.constant;
-    PointsInTiles points = {mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61), {},
-                            {},   {}};
+    PointsInTiles points = {
+        mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61), with_areas, {}, {}, {}};
     try {
         const double pairs = 2.0 * double(mesh.triangles.size()) + 4.0 * point_limit(options.max_points);
         const double width = std::max(kTileWidth * unit, kLeastTileWidth * largest);
@@ -84,21 +105,29 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
     const std::size_t count = points.grid.count();
     points.darts.resize(count);
     points.borders.resize(count);
-    std::vector<std::uint32_t> colours[8];
-    for (std::size_t i = 0; i < count; ++i) colours[points.grid.colour(i)].push_back(std::uint32_t(i));
-    oneapi::tbb::enumerable_thread_specific<TileFiller> fillers([&] { return TileFiller(points); });
-    std::atomic<std::size_t> done = 0;
-    for (const std::vector<std::uint32_t>& tiles : colours) {
-        parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i) fillers.local().fill(tiles[i]);
-            if (progress) progress->update("points", double(done += end - begin) / double(count));
-        });
+    TileFillers fillers([&] { return TileFiller(points); });
+    // A tile's turn comes when all of its neighbours of earlier colours are filled.
+    std::vector<std::uint32_t> first;
+    std::vector<std::atomic<std::uint8_t>> waits_for(count);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        std::uint8_t earlier = 0;
+        for (const TileGrid::Neighbour& other : points.grid.neighbours(i)) {
+            earlier += points.grid.colour(other.tile) < points.grid.colour(i);
+        }
+        waits_for[i].store(earlier, std::memory_order_relaxed);
+        if (earlier == 0) first.push_back(i);
     }
-    done = 0;
-    parallel_for(count, 4, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) fillers.local().share_border(i);
-        if (progress) progress->update("areas", double(done += end - begin) / double(count));
+    std::atomic<std::size_t> done = 0;
+    oneapi::tbb::parallel_for_each(first, [&](std::uint32_t tile, oneapi::tbb::feeder<std::uint32_t>& feeder) {
+        fillers.local().fill(tile);
+        for (const TileGrid::Neighbour& other : points.grid.neighbours(tile)) {
+            if (points.grid.colour(other.tile) > points.grid.colour(tile) && --waits_for[other.tile] == 0) {
+                feeder.add(other.tile);
+            }
+        }
+        if (progress) progress->update("points", double(++done) / double(count));
     });
+    if (with_areas) share_borders(points, fillers, progress);
     return points;
 }
 
@@ -132,7 +161,7 @@ PointSet poisson_points(const Mesh& mesh, double spacing, const PoissonOptions& 
         throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", spacing, ". It is in metres."));
     }
     check_mesh(mesh, "Mesh");
-    PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, options, progress);
+    PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, true, options, progress);
     return finish(points, spacing);
 }
 
@@ -152,7 +181,7 @@ PointSet poisson_points(const Mesh& mesh, const std::vector<float>& vertex_spaci
         largest = std::max<double>(largest, r);
     }
     check_mesh(mesh, "Mesh");
-    PointsInTiles points = place_points(mesh, {largest, &vertex_spacing}, largest, options, progress);
+    PointsInTiles points = place_points(mesh, {largest, &vertex_spacing}, largest, true, options, progress);
     return finish(points, largest);
 }
 
@@ -169,16 +198,22 @@ PointSet poisson_points_by_count(const Mesh& mesh, std::uint64_t count, const Po
     // While looking, a first guess may be off by much where walls crowd each other.
     bounded.max_points = std::max<std::uint64_t>(4 * bounded.max_points, 10000);
 
-    const double area = surface_area(mesh);
-    double spacing = area > 0.0 ? std::sqrt(0.71 * area / double(count)) : 1.0;
+    const Extent extent = measure(mesh, {1.0, nullptr});
+    double spacing = extent.area > 0.0 ? std::max(std::sqrt(0.71 * extent.area / double(count)),
+                                                  0.5 * std::sqrt(extent.longest2) / double(count))
+                                       : 1.0;
     double fewer = 0.0, more = 0.0;  // spacings known to give too few and too many points
     std::size_t nearest = 0;
     constexpr int kMostTries = 60;
     for (int attempt = 0; attempt < kMostTries; ++attempt) {
-        PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, bounded, progress);
+        PointsInTiles points = place_points(mesh, {spacing, nullptr}, spacing, false, bounded, progress);
         const std::size_t got = point_count(points);
         const double error = std::abs(double(got) - double(count));
-        if (error <= 0.005 * double(count)) return finish(points, spacing);
+        if (error <= 0.005 * double(count)) {
+            TileFillers fillers([&] { return TileFiller(points); });
+            share_borders(points, fillers, progress);
+            return finish(points, spacing);
+        }
         if (nearest == 0 || error < std::abs(double(nearest) - double(count))) nearest = got;
         // Points go as 1 / spacing²; a guess outside of what is known goes to its middle.
         (got < count ? fewer : more) = spacing;

@@ -130,7 +130,7 @@ struct Spans {
 
 // A share while its edges are collected: twice its area, and the way around it, which ends where it began.
 struct Outline {
-    float twice = 0.0f, x = 0.0f, y = 0.0f;
+    float twice, x, y;
 };
 
 template <bool kVaries>
@@ -185,6 +185,7 @@ bool share_patch_as(const Patch& patch, const Candidates& candidates, std::vecto
     if (count > 1) {
         // Along the line between two owners' shares: what is not nearer to a third, and inside of the patch.
         make_lines(owners, lines);
+        for (int p = 0; p < count; ++p) outlines[p] = {0.0f, 0.0f, 0.0f};
         for (int g = 0; g < lines.count; g += kWide) {
             const Eight ax = load(lines.ax + g), ay = load(lines.ay + g), c = load(lines.c + g);
             const Eight length2 = ax * ax + ay * ay, k = c / length2;

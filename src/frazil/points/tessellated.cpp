@@ -34,7 +34,7 @@ PointSet tessellated_points(const Mesh& mesh, double edge_length) {
         throw ValueError(str("Mesh: area must be > 0, got ", mesh.triangles.size(),
                              " triangles without area. Points need a surface."));
     }
-    check_budget(predicted, 0, "edge_length", edge_length);
+    check_budget(predicted, 2, 0, "edge_length", edge_length);
 
     std::vector<std::size_t> first(mesh.triangles.size() + 1, 0);
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {

@@ -75,7 +75,7 @@ void TileFiller::fill(std::size_t tile) {
     states_.clear();
     std::vector<std::int32_t>& border = points_.borders[tile];
     for (const Patch& patch : patches_) {
-        states_.push_back({0, 0, 0, 0, 0, is_final(patch)});
+        states_.push_back({0, 0, 0, 0, 0, points_.with_areas && is_final(patch)});
         if (!states_.back().is_final && (border.empty() || border.back() != patch.triangle)) {
             border.push_back(patch.triangle);
         }
@@ -116,7 +116,7 @@ void TileFiller::share_border(std::size_t tile) {
     for (const std::int32_t triangle : border) {
         append_patches(points_.mesh, points_.spacing, frame_, triangle, patches_);
     }
-    std::erase_if(patches_, [&](const Patch& patch) { return is_final(patch); });
+    if (points_.with_areas) std::erase_if(patches_, [&](const Patch& patch) { return is_final(patch); });
     if (patches_.empty()) return;
     prepare_neighbourhood();
     enter(tile);

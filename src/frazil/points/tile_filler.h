@@ -36,6 +36,7 @@ struct PointsInTiles {
     std::uint32_t seed;
     double unit;          // the reference spacing, metres
     double area_quantum;  // m²
+    bool with_areas;      // as soon as they are known; else all patches wait as those at borders do
     TileGrid grid;
     std::vector<std::vector<Dart>> darts;
     std::vector<std::vector<std::int32_t>> borders;  // triangles with patches that wait for later tiles

@@ -102,7 +102,10 @@ Box3f box_of_patches(const Mesh& mesh, const SpacingField& spacing, const TileGr
         const V3i& t = mesh.triangles[grid.triangles[i]];
         Box3f corners;
         for (int k = 0; k < 3; ++k) corners.extendBy(mesh.positions[t[k]]);
-        if (!shape_of(mesh, spacing, grid.triangles[i]).is_whole) {
+        // What is not longer than a whole triangle's edge is one.
+        const V3d extent = V3d(corners.max) - V3d(corners.min);
+        const double least = kLongestEdge * (spacing.per_vertex ? 0.0 : spacing.constant);
+        if (extent.length2() > least * least && !shape_of(mesh, spacing, grid.triangles[i]).is_whole) {
             const double largest =
                 std::max(spacing.at_vertex(t.x), std::max(spacing.at_vertex(t.y), spacing.at_vertex(t.z)));
             for (int axis = 0; axis < 3; ++axis) {

@@ -9,6 +9,7 @@
 #include "frazil/points/point_budget.h"
 #include "frazil/points/poisson.h"
 #include "frazil/points/pose.h"
+#include "frazil/points/sampled_spacing.h"
 #include "frazil/render/bounces.h"
 #include "frazil/render/stopwatch.h"
 
@@ -61,37 +62,64 @@ PointSet moved(const PointSet& points, const M44f& matrix) {
     return result;
 }
 
-// The spacing at each vertex in the world, where it varies: the mesh's own or a texture's, and no finer than the pixels asked for. Empty
-// where it is the same all over.
-std::vector<float> vertex_spacing(const Scene& scene, const Object& object, float spacing,
-                                  const RenderOptions& options) {
-    const Mesh& mesh = scene.meshes[object.mesh];
-    const auto& texture = std::get<IceMaterial>(scene.materials[object.material].model).spacing;
-    std::vector<float> result;
-    if (options.spacing == 0.0f && !mesh.spacing.empty()) {
-        result = mesh.spacing;
-    } else if (options.spacing == 0.0f && texture.lookup.texture && !mesh.uvs.is_empty()) {
-        result.assign(mesh.positions.size(), 0.0f);
-        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-            for (int k = 0; k < 3; ++k) {
-                const V2f uv = mesh.uvs.at(mesh.triangles, std::uint32_t(i), V2f(k == 1, k == 2));
-                result[mesh.triangles[i][k]] = eval_float(texture, uv);
+// The largest value of a texture on a mesh, by samples of all triangles.
+float largest_on(const Mesh& mesh, const MaterialInput<float>& texture) {
+    constexpr double kSamples = 1 << 16;
+    const int steps = static_cast<int>(std::clamp(std::sqrt(kSamples / double(mesh.triangles.size())), 1.0, 64.0));
+    float largest = 0.0f;
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        for (int u = 0; u <= steps; ++u) {
+            for (int v = 0; u + v <= steps; ++v) {
+                const V2f at = V2f(float(u), float(v)) / float(steps);
+                largest = std::max(largest, eval_float(texture, mesh.uvs.at(mesh.triangles, i, at)));
             }
         }
-        const float largest = *std::max_element(result.begin(), result.end());
-        if (!(largest > 0.0f)) return {};
-        for (float& value : result) value = std::max(value, largest / kFinestByTexture);
     }
-    for (float& value : result) value *= options.spacing_scale;
+    return largest;
+}
+
+// How far apart points are on an object, in the world: the same all over, linear between vertices, or anything else.
+struct PointSpacing {
+    float constant = 0.0f;
+    std::vector<float> at_vertices;
+    SpacingFunction anywhere;
+};
+
+// The mesh's own spacing or a texture's, and no finer than the pixels asked for.
+PointSpacing spacing_on(const Scene& scene, const Object& object, float constant, const RenderOptions& options) {
+    const Mesh& mesh = scene.meshes[object.mesh];
+    const auto& texture = std::get<IceMaterial>(scene.materials[object.material].model).spacing;
+    PointSpacing result;
+    result.constant = constant;
+    SpacingFunction base = [constant](std::uint32_t, const V2f&) { return constant; };
+    if (options.spacing == 0.0f && !mesh.spacing.empty()) {
+        result.at_vertices = mesh.spacing;
+        for (float& value : result.at_vertices) value *= options.spacing_scale;
+        base = [&mesh, scale = options.spacing_scale](std::uint32_t triangle, const V2f& uv) {
+            const V3i& t = mesh.triangles[triangle];
+            return scale *
+                   (mesh.spacing[t.x] * (1.0f - uv.x - uv.y) + mesh.spacing[t.y] * uv.x + mesh.spacing[t.z] * uv.y);
+        };
+    } else if (options.spacing == 0.0f && texture.lookup.texture && !mesh.uvs.is_empty()) {
+        const float largest = largest_on(mesh, texture);
+        if (largest > 0.0f) {
+            const float least = largest / kFinestByTexture;
+            base = [&mesh, &texture, least, scale = options.spacing_scale](std::uint32_t triangle, const V2f& uv) {
+                return scale * std::max(least, eval_float(texture, mesh.uvs.at(mesh.triangles, triangle, uv)));
+            };
+            result.anywhere = base;
+        }
+    }
     if (options.spacing_pixels == 0.0f) return result;
-    if (result.empty()) result.assign(mesh.positions.size(), spacing);
     const PixelCone cone = pixel_cone(scene.camera, options.width, options.height);
     const V3f eye = V3f(0.0f) * scene.camera.camera_to_world;
-    for (std::size_t i = 0; i < result.size(); ++i) {
-        const float distance = (mesh.positions[i] * object.local_to_world - eye).length();
-        const float pixels = options.spacing_pixels * 2.0f * (cone.radius + cone.spread * distance);
-        result[i] = std::clamp(pixels, result[i], kCoarsestByPixels * result[i]);
-    }
+    result.anywhere = [=, &mesh, &object, pixels = options.spacing_pixels](std::uint32_t triangle, const V2f& uv) {
+        const V3i& t = mesh.triangles[triangle];
+        const V3f place =
+            mesh.positions[t.x] * (1.0f - uv.x - uv.y) + mesh.positions[t.y] * uv.x + mesh.positions[t.z] * uv.y;
+        const float distance = (place * object.local_to_world - eye).length(), finest = base(triangle, uv);
+        return std::clamp(pixels * 2.0f * (cone.radius + cone.spread * distance), finest, kCoarsestByPixels * finest);
+    };
     return result;
 }
 
@@ -120,8 +148,11 @@ class Shapes {
     PointSet points_of(const Object& object, Shape& shape, float spacing, const RenderOptions& options,
                        Progress* progress) {
         const M44f to_world = shape.stretch.inverse() * object.local_to_world;
-        const std::vector<float> varying = vertex_spacing(scene_, object, spacing, options);
-        if (!varying.empty()) return moved(place(object, shape, varying, options, progress), to_world);
+        const PointSpacing wanted = spacing_on(scene_, object, spacing, options);
+        if (wanted.anywhere) return moved(place(object, shape, wanted.anywhere, options, progress), to_world);
+        if (!wanted.at_vertices.empty()) {
+            return moved(place(object, shape, wanted.at_vertices, options, progress), to_world);
+        }
         auto known = shape.points.find(spacing);
         if (known == shape.points.end()) {
             known = shape.points.emplace(spacing, place(object, shape, spacing, options, progress)).first;

@@ -217,6 +217,7 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
         const Body& ice = *bodies_[boundary.hit.placement];
         const float cosine = std::abs(surface.normal.dot(ray.direction));
         result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
+        result *= ice.material->refraction_tint;
         if (boundary.is_entered) {
             result *= ice.material->refraction;
         } else if (is_within) {

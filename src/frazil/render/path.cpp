@@ -81,7 +81,8 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         const V3f wo = -path.ray.direction;
         path.width += path.spread * length;
         Surface surface = resolver_.resolve(hit, path.ray.direction, path.width, path.bounce == 0);
-        surface.covering.roughness = blurred_roughness(surface.covering.roughness, path.blur);
+        const float blur = std::hypot(path.blur, surface.normal_spread);
+        surface.covering.roughness = blurred_roughness(surface.covering.roughness, blur);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
             const float depth = (surface.position - eye).dot(*view_axis);
@@ -123,7 +124,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         }
 
         // Go straight on where the surface is cut out; every hit in turn tosses its own coin.
-        const Shader shader(surface, body, path.blur);
+        const Shader shader(surface, body, blur);
         if (const float opacity = shader.opacity(); opacity < 1.0f) {
             Sampler coin = path.sampler;
             coin.set_dimension(kTransparencyDimensions + static_cast<std::uint32_t>(path.straight));

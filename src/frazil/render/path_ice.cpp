@@ -64,6 +64,7 @@ bool PathTracer::enter(Path& path, const Surface& surface, const Crossing& cross
     path.begin_piece(core, ice.volume * bare);
     path.core.is_entered = true;
     path.clear = ice.refraction * bare;
+    path.tint = ice.refraction_tint;
     path.core_share = 1.0f / std::max(1.0f - surface.covering.scattered, bare + 1e-6f);
     path.spread += lobe_spread(refraction_alpha(ice, surface));
     path.add_blur(refraction_alpha(ice, surface));
@@ -94,8 +95,9 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
     }
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
-    path.scale(unscattered * exp(medium.sigma_a * -through.absorption));
+    path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
     path.clear = path.core_share = 1.0f;
+    path.tint = Rgb(1.0f);
     const Scattering w = path.weights();
     const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
     return left > 0.0f && path.survives(left / kFaint);
@@ -107,6 +109,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     const IceMaterial& ice = *bodies_[surface.object]->material;
     const float eta = interiors_.eta(crossing.to) / interiors_.eta(crossing.from);
     if (is_index_matched(eta)) {
+        path.scale(ice.refraction_tint);
         path.inside = crossing.beyond;
         path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ++path.straight;
@@ -141,7 +144,8 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
                         on_side(frame.to_world(sample.wi), surface.geometric_normal, 1.0f));
     } else {
         path.pass_boundary();
-        path.scatter({Rgb(0.0f), Rgb(0.0f), Rgb(1.0f), inner_transmission(wo, sample.wi, alpha, eta)}, surface.object);
+        path.scatter({Rgb(0.0f), Rgb(0.0f), ice.refraction_tint, inner_transmission(wo, sample.wi, alpha, eta)},
+                     surface.object);
         path.receive(surface, -surface.geometric_normal, LightUse::refraction);
         path.is_delta = crossing.to != InsideOf::kNone;
         path.inside = crossing.beyond;

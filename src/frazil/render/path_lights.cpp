@@ -168,13 +168,14 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const Light& light = lights_.lights()[std::size_t(sample.light)];
     if (!path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) return;
     Scattering weights = path.weights();
-    weights.scale(Rgb(value * multiplier(light, LightComponent::refraction)));
+    const Rgb lobe =
+        bodies_[surface.object]->material->refraction_tint * (value * multiplier(light, LightComponent::refraction));
+    weights.scale(lobe);
     // Before the first lobe the boundary itself is the first.
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
     const Rgb radiance = sample.radiance * visible * beyond.light_share * (mis / sample.pdf);
     deliver(path, Component::refraction, weights, group, radiance, tile);
-    add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light,
-                    radiance * (value * multiplier(light, LightComponent::refraction)), tile);
+    add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light, radiance * lobe, tile);
 }
 
 void PathTracer::add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const {

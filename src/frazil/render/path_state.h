@@ -96,6 +96,7 @@ struct Path {
     InsideOf inside;
     IceCore core;
     float clear = 1.0f, volume = 0.0f;  // how much of the next piece is seen through, and scattered once
+    Rgb tint = Rgb(1.0f);               // of what is seen through, by the boundary where the piece begins
     float core_share = 1.0f;            // of what is seen through, how much the core leaves out for it
     // Slopes of the lobes so far, alphas added in quadrature: further lobes are at least as broad.
     float blur = 0.0f;
@@ -171,6 +172,7 @@ struct Path {
     void begin_piece(const IceCore& from, float volume_weight) {
         core = from;
         clear = core_share = 1.0f;
+        tint = Rgb(1.0f);
         volume = volume_weight;
     }
 

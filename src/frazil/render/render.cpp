@@ -9,6 +9,7 @@
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
+#include "frazil/lighting/group_balance.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
@@ -16,6 +17,7 @@
 #include "frazil/render/openness.h"
 #include "frazil/render/overlay_layers.h"
 #include "frazil/render/path.h"
+#include "frazil/render/receivers.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -211,7 +213,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
                              const Checkpoints* checkpoints) {
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
-    const LightSampler lights(scene.lights);
+    LightSampler lights(scene.lights);
+    const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
+    balance_groups(lights, ray_scene, receivers_in_view(scene.camera, aspect, ray_scene));
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);

@@ -19,6 +19,10 @@ void check_material(const Material& material) {
     require(ice->translucency >= 0.0f && ice->translucency <= 1.0f, "translucency must be in 0..1", ice->translucency);
     require(ice->refraction >= 0.0f && ice->refraction <= 1.0f, "refraction must be in 0..1", ice->refraction);
     require(ice->refraction_roughness <= 1.0f, "refraction_roughness must be in 0..1", ice->refraction_roughness);
+    for (int c = 0; c < 3; ++c) {
+        require(ice->refraction_tint[c] >= 0.0f && ice->refraction_tint[c] <= 1.0f, "refraction_tint must be in 0..1",
+                ice->refraction_tint[c]);
+    }
     require(ice->volume >= 0.0f && ice->volume <= 1.0f, "volume must be in 0..1", ice->volume);
     require(ice->anisotropy >= -0.95f && ice->anisotropy <= 0.95f, "anisotropy must be in -0.95..0.95",
             ice->anisotropy);

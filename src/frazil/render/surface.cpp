@@ -42,6 +42,30 @@ V3f lifted(const V3f corners[3], const V3f normals[3], const V2f& uv, const V3f&
     return position + sum;
 }
 
+// The longer and the shorter half axis of what a cone of radius `footprint` cuts out of the surface.
+std::pair<V3f, V3f> footprint_axes(const V3f& n, const V3f& wo, float footprint, float least_cosine) {
+    V3f slant = wo - n * n.dot(wo);
+    slant = slant.length2() > 1e-8f ? slant.normalized() : tangent_frame(n).first;
+    const float cosine = std::clamp(n.dot(wo), least_cosine, 1.0f);
+    return {slant * (footprint / cosine), n.cross(slant) * footprint};
+}
+
+// The alpha of the normals' slopes over a footprint, from how they turn over the triangle.
+float spread_of_normals(const V3f corners[3], const V3f normals[3], const V3f& n, const V3f& wo, float footprint) {
+    constexpr float kLeastCosine = 0.1f, kMost = 0.42f;
+    const V3f e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
+    const float a = e1.dot(e1), b = e1.dot(e2), c = e2.dot(e2), determinant = a * c - b * b;
+    if (!(determinant > 0.0f)) return 0.0f;
+    const auto turn2 = [&](const V3f& way) {
+        const float x = way.dot(e1), y = way.dot(e2);
+        const float u = (c * x - b * y) / determinant, v = (a * y - b * x) / determinant;
+        return ((normals[1] - normals[0]) * u + (normals[2] - normals[0]) * v).length2();
+    };
+    const auto [longer, shorter] = footprint_axes(n, wo, footprint, kLeastCosine);
+    // Half of the mean square over the ellipse is alpha² of the slopes.
+    return std::min(kMost, std::sqrt(0.5f * (turn2(longer) + turn2(shorter))));
+}
+
 bool has_image(const TextureLookup& lookup) {
     return lookup.texture != nullptr;
 }
@@ -215,6 +239,10 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
             }
             const V3f place = lifted(corners, normals, hit.uv, surface.position);
             if (is_finite(place)) surface.lifted = place;
+            if (footprint > 0.0f) {
+                const float spread = spread_of_normals(corners, normals, surface.geometric_normal, wo, footprint);
+                if (std::isfinite(spread)) surface.normal_spread = spread;
+            }
         }
     }
     surface.horizon = surface.normal;
@@ -234,12 +262,9 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     at = texture_point(hit.placement, hit.triangle, hit.uv, surface.position, surface.normal * side);
     if (footprint > 0.0f && has_images) {
         // The cone's circle, drawn out where the surface is seen aslant.
-        const V3f& n = surface.geometric_normal;
-        const float cosine = std::clamp(n.dot(wo), 1e-3f, 1.0f);
-        V3f slant = wo - n * n.dot(wo);
-        slant = slant.length2() > 1e-8f ? slant.normalized() : tangent_frame(n).first;
-        world_to_rest(hit.placement).multDirMatrix(slant * (footprint / cosine), at.long_axis);
-        world_to_rest(hit.placement).multDirMatrix(n.cross(slant) * footprint, at.short_axis);
+        const auto [longer, shorter] = footprint_axes(surface.geometric_normal, wo, footprint, 1e-3f);
+        world_to_rest(hit.placement).multDirMatrix(longer, at.long_axis);
+        world_to_rest(hit.placement).multDirMatrix(shorter, at.short_axis);
     }
     V3f mapped = at.normal;
     if (with_bump && has_images) {

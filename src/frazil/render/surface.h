@@ -3,7 +3,8 @@
 //   are read in rest space: the object's own frame under its scale, without its rotation and place, so that their widths
 //   are metres and they stay with a moving object. Textures see the ellipse that the ray's cone cuts out of the surface.
 //   Light is not cut off by the facets of a smooth mesh: `horizon` is the smooth normal's, and rays leave from `lifted`,
-//   the place on the curved surface that the vertices' normals tell [Hanika2021].
+//   the place on the curved surface that the vertices' normals tell [Hanika2021]. Where these turn within the footprint the
+//   surface looks rougher: their variance, as slopes, adds to that of the microfacets [TokuyoshiKaplanyan2019].
 // Units: metres, world space.
 #pragma once
 
@@ -24,9 +25,10 @@ struct Surface {
     V3f normal = V3f(0.0f);            // for shading, unit length, the viewer above it
     V3f horizon = V3f(0.0f);           // the same without bump and normal map
     V3f lifted = V3f(0.0f);            // where rays leave on the viewer's side
-    V2f st = V2f(0.0f);                // (0, 0) where the mesh has none
-    TexturePoint texture_point;        // where textures are read; st alone for materials that read none
-    V3f local_position = V3f(0.0f);    // in the mesh's own space, in its rest pose
+    float normal_spread = 0.0f;      // slope by which the normal varies over the footprint: at least as rough it looks
+    V2f st = V2f(0.0f);              // (0, 0) where the mesh has none
+    TexturePoint texture_point;      // where textures are read; st alone for materials that read none
+    V3f local_position = V3f(0.0f);  // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
     Covering covering;   // of ice: its overlays, with the roughness that they leave
     PatternPoint place;  // where those read their patterns
