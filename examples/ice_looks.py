@@ -1,8 +1,9 @@
-"""Pictures of the ice material: presets at three ages, rocks at three depths, and breath ice with its volume.
+"""Pictures of the ice material: presets at ages, rocks at three depths, breath ice, shells that run into each other.
 
     python examples/ice_looks.py sheet -o out/ice_sheet.png [--size 150] [--samples 16]
     python examples/ice_looks.py depths -o out/ice_depths.png
     python examples/ice_looks.py breath -o out/ice_breath.png
+    python examples/ice_looks.py shells -o out/ice_shells.png
 
 The scenes are made in Python, without USD: a piece of ice on snow under a cold sky, a low sun behind it. Pictures are
 denoised.
@@ -180,16 +181,44 @@ def breath(size: int, samples: int) -> np.ndarray:
     return np.concatenate(pictures, 1)
 
 
+def shells(size: int, samples: int) -> np.ndarray:
+    """Seven splinters that run into each other: each for itself, and as one translucency set."""
+    shard = Shard((1.05, 1.15, 0.8), 4)
+    mesh = to_mesh(contour(shard, *shard.bounds(), 0.025).largest_piece())
+    rng = np.random.default_rng(1)
+    places = []
+    for number in range(7):
+        turn, lean = 2 * np.pi * number / 7 + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.45)
+        c, s = np.cos(turn), np.sin(turn)
+        upright = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+        tilted = np.array([[np.cos(lean), np.sin(lean), 0], [-np.sin(lean), np.cos(lean), 0], [0, 0, 1]])
+        matrix = np.eye(4)
+        matrix[:3, :3] = rng.uniform(0.55, 0.9) * tilted @ upright
+        matrix[3, :3] = 0.28 * c, 0.33, 0.28 * s
+        places.append(matrix)
+    pictures = []
+    for together in ("", "ice"):
+        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.42, 0.0), 64.0)
+        ice = fz.ice_preset("old_glacier", age=0.2, depth=kDepth, spacing=0.03, overlays=[])
+        material, geometry = scene.add_material("/ice", ice), scene.add_mesh(mesh, "/ice")
+        for number, matrix in enumerate(places):
+            scene.add_object(f"/ice{number}", geometry, material, matrix, translucency_set=together)
+        pictures.append(picture(scene, size, size, samples))
+    return np.concatenate(pictures, 1)
+
+
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("sheet", "depths", "breath"))
+    parser.add_argument("what", choices=("sheet", "depths", "breath", "shells"))
     parser.add_argument("-o", "--output", type=Path, required=True, help="the PNG to write")
     parser.add_argument("--docs", type=Path, help="a small copy, of 6 bits a channel")
     parser.add_argument("--size", type=int, default=150, help="pixels along a side of one picture")
     parser.add_argument("--samples", type=int, default=16, help="per pixel")
     options = parser.parse_args(arguments)
     start = time.monotonic()
-    pixels = {"sheet": sheet, "depths": depths, "breath": breath}[options.what](options.size, options.samples)
+    pixels = {"sheet": sheet, "depths": depths, "breath": breath, "shells": shells}[options.what](
+        options.size, options.samples
+    )
     try:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         write_png(options.output, np.ascontiguousarray(pixels))

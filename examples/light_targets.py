@@ -1,7 +1,7 @@
 """One light, told to act on one component at a time: python examples/light_targets.py [OUT.png].
 
-A spire on a floor under a grey sky, with a warm light behind it. From left to right the light acts on everything, on
-translucency alone, on specular, on diffuse, on nothing.
+A spire on a floor under a grey sky, with a warm light behind it. Above, from left to right, it acts on everything, on
+translucency alone, on specular, on diffuse; below on refraction, on volume, on translucency by -0.3, on nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,13 @@ import numpy as np
 import frazil as fz
 from frazil.image import write_png
 
-ALL = {"translucency": 1.0, "specular": 1.0, "diffuse": 1.0, "refraction": 1.0}
+COMPONENTS = ("translucency", "specular", "diffuse", "refraction", "volume")
+TARGETS = (
+    dict.fromkeys(COMPONENTS, 1.0),
+    *({name: 1.0} for name in COMPONENTS),
+    {"translucency": -0.3},
+    {},
+)
 
 
 def spire(sides: int = 7, rings: int = 60) -> fz.Mesh:
@@ -42,8 +48,8 @@ def look_at(eye, target) -> np.ndarray:
 
 def scene_with(multipliers: dict[str, float]) -> fz.Scene:
     scene = fz.Scene()
-    medium = fz.Medium(sigma_s_prime=(25.0, 25.0, 25.0), sigma_a=(2.0, 0.4, 0.15), eta=1.31)
-    ice = scene.add_material("/ice", fz.IceMaterial(medium, refraction=0.0, roughness=0.25))
+    medium = fz.Medium(sigma_s_prime=(12.0, 12.0, 12.0), sigma_a=(2.0, 0.4, 0.15), eta=1.31)
+    ice = scene.add_material("/ice", fz.IceMaterial(medium, refraction=1.0, volume=1.0, roughness=0.25))
     grey = scene.add_material("/grey", fz.StandardMaterial(diffuse_color=(0.45, 0.45, 0.45), roughness=0.4))
     scene.add_object("/spire", scene.add_mesh(spire(), "/spire"), ice)
     corners = np.float32([[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]])
@@ -51,7 +57,7 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
     scene.add_object("/floor", floor, grey)
     scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.20, 0.23, 0.27], path="/sky"))
     rim = look_at((0.9, 1.2, -1.0), (0, 0.4, 0))
-    off = dict.fromkeys(ALL, 0.0)
+    off = dict.fromkeys(COMPONENTS, 0.0)
     scene.add_light(
         fz.Light(fz.RectLight(0.7, 0.7), matrix=rim, radiance=[34.0, 25.0, 15.0], path="/rim", **(off | multipliers))
     )
@@ -60,11 +66,9 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
 
 
 def main(path: str = "light_targets.png") -> None:
-    pictures = []
-    for chosen in (ALL, *({name: 1.0} for name in ("translucency", "specular", "diffuse")), {}):
-        film = fz.render(scene_with(chosen), resolution=(180, 240), samples=64)
-        pictures.append(film["beauty"][:, :, :3])
-    write_png(path, np.concatenate(pictures, axis=1))
+    pictures = [fz.render(scene_with(chosen), resolution=(180, 240), samples=64) for chosen in TARGETS]
+    rows = [np.concatenate([film["beauty"][:, :, :3] for film in pictures[k : k + 4]], axis=1) for k in (0, 4)]
+    write_png(path, np.concatenate(rows))
 
 
 if __name__ == "__main__":

@@ -704,6 +704,38 @@ class ObjectSet:
 
     def __len__(self) -> int: ...
 
+class IesProfile:
+    """
+    A luminaire's light by direction (IES LM-63, type C), bilinear in the angles; see read_ies.
+
+    Parameters
+    ----------
+    vertical : (V,) degrees that rise within 0 (the light's -z) to 180; beyond them it gives nothing.
+    horizontal : (H,) degrees, from 0 to 0, 90, 180 or 360, or from 90 to 270: less than a turn is mirrored.
+    values : (H, V) intensities in candela, >= 0.
+    path : name for messages.
+    """
+
+    def __init__(self, vertical: Sequence[float], horizontal: Sequence[float], values: Sequence[Sequence[float]], path: str = 'IesProfile') -> None: ...
+
+    @property
+    def vertical(self) -> list[float]: ...
+
+    @property
+    def horizontal(self) -> list[float]: ...
+
+    @property
+    def values(self) -> list[list[float]]: ...
+
+    @property
+    def mean(self) -> float:
+        """Mean intensity over the sphere, or the hemisphere that it covers."""
+
+    def intensity(self, direction: Sequence[float]) -> float:
+        """
+        Intensity towards a unit direction in the light's own frame; -z is vertical angle 0.
+        """
+
 class Shaping:
     """
     How the light depends on the angle from -z (UsdLuxShapingAPI).
@@ -713,9 +745,12 @@ class Shaping:
     cone_angle : degrees from the axis beyond which nothing shines, 0 to 180; 180 = no cone.
     cone_softness : >= 0; the part of the angle over which the light fades.
     focus : >= 0; exponent of the cosine. focus_tint : RGB that takes the place of what focus removes.
+    ies : IesProfile that multiplies the light, None = none. ies_angle_scale : widens (> 1) or narrows (< 1) the
+        profile about straight down, negative ones about straight up; 0 = neither.
+    ies_normalize : divide the profile by its mean.
     """
 
-    def __init__(self, *, cone_angle: float = 180.0, cone_softness: float = 0.0, focus: float = 0.0, focus_tint: Sequence[float] = [0.0, 0.0, 0.0]) -> None: ...
+    def __init__(self, *, cone_angle: float = 180.0, cone_softness: float = 0.0, focus: float = 0.0, focus_tint: Sequence[float] = [0.0, 0.0, 0.0], ies: IesProfile | None = None, ies_angle_scale: float = 0.0, ies_normalize: bool = False) -> None: ...
 
     @property
     def cone_angle(self) -> float: ...
@@ -728,6 +763,15 @@ class Shaping:
 
     @property
     def focus_tint(self) -> list[float]: ...
+
+    @property
+    def ies(self) -> IesProfile: ...
+
+    @property
+    def ies_angle_scale(self) -> float: ...
+
+    @property
+    def ies_normalize(self) -> bool: ...
 
 class ShadowRules:
     """
@@ -934,7 +978,7 @@ def point_occlusion(points: PointSet, *, distance: float = float('inf'), toleran
 
 def measure_bake(points: object, scene: RayScene, lights: Sequence[Light], samples: int, is_bare: bool) -> tuple[int, float]:
     """
-    (rays, seconds) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
+    (rays, seconds of processor time) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.
     """
 
 class TextureTile:
@@ -1899,7 +1943,9 @@ class Bake:
         """Objects of the scene."""
 
     def points(self, index: int) -> PointSet:
-        """The PointSet of an object; empty where it is not ice."""
+        """
+        A copy of the PointSet of an object, in the world; empty where it is not ice.
+        """
 
     def irradiance(self, index: int) -> NDArray[numpy.float32]:
         """

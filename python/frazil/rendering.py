@@ -8,12 +8,14 @@ Not: reading scenes and writing files.
 
 import json
 import os
+import re
 import resource
 import sys
 import time
 import warnings
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -179,6 +181,7 @@ def render(
         "mattes": resolve_mattes(scene, mattes),
     }
     _refuse_what_cannot_fit(*resolution)
+    _warn_of_unknown_labels(scene, lpes or {})
     if resume and checkpoint is None:
         raise ValueError("render: resume must come with a checkpoint, got none. Name its file.")
     if denoise:
@@ -273,6 +276,25 @@ def _what_layers_hold(result: Any) -> dict[str, Any]:
         "frazil:ramp_knots": json.dumps(knots) if knots else None,
         "frazil:overlays": json.dumps(list(result.overlays)) if result.overlays else None,
     }
+
+
+def _warn_of_unknown_labels(scene: Any, lpes: Mapping[str, str]) -> None:
+    """Labels of expressions that match nothing, such as a misspelt light group: their layers would be black."""
+    lobes = ("diffuse", "specular", "refraction", "translucency")
+    groups = dict.fromkeys(light.group or "default" for light in scene.lights)
+    paths = [item.path for item in (*scene.objects, *scene.lights)]
+    known = {*groups, *paths, *lobes, ""}
+    for name, expression in lpes.items():
+        for label in dict.fromkeys(re.findall(r"'([^']*)'", expression)):
+            if label in known:
+                continue
+            nearest = get_close_matches(label, sorted(known), n=1)
+            hint = f" Did you mean {nearest[0]!r}?" if nearest else ""
+            message = (
+                f"lpe {name}: label must be a light group ({', '.join(groups)}), a lobe, or the path of an object or "
+                f"light, got {label!r}. It matches nothing.{hint}"
+            )
+            warnings.warn(message, FrazilWarning, stacklevel=3)
 
 
 def _refuse_what_cannot_fit(width: int, height: int) -> None:

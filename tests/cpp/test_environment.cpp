@@ -62,6 +62,44 @@ TEST_CASE("environment: pdf integrates to 1 and is the density of sample()") {
     }
 }
 
+TEST_CASE("environment: many at once are the same bits as one at a time, and none above a plane is left out") {
+    for (const auto& [width, height] : {std::pair{64, 32}, {1, 1}, {5, 3}, {2, 40}, {40, 4}}) {
+        const Environment env = gradient(width, height);
+        std::vector<V2f> u;
+        for (std::uint32_t i = 0; i < 77; ++i) u.push_back(Sampler(5, 6, i).next_2d());
+        std::vector<V3f> directions(u.size());
+        std::vector<float> pdfs(u.size()), found(u.size());
+        std::vector<Rgb> radiances(u.size()), seen(u.size());
+        env.sample_many(V3f(0.0f), u, directions, pdfs, radiances);
+        env.eval_many(directions, found, seen);
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            float pdf;
+            Rgb radiance;
+            CHECK(env.sample(u[i], pdf, radiance) == directions[i]);
+            CHECK(pdf == pdfs[i]);
+            CHECK(radiance == radiances[i]);
+            CHECK(env.eval(directions[i], pdf) == seen[i]);
+            CHECK(pdf == found[i]);
+        }
+        int left_out = 0;
+        for (const V3f& n : {V3f(0, 1, 0), V3f(0, -1, 0), V3f(0.6f, 0, 0.8f), V3f(-0.48f, 0.64f, -0.6f)}) {
+            std::vector<V3f> above(u.size(), V3f(0.0f));
+            env.sample_many(n, u, above, found, seen);
+            for (std::size_t i = 0; i < u.size(); ++i) {
+                if (found[i] == 0.0f) {
+                    ++left_out;
+                    CHECK(directions[i].dot(n) < 0.0f);
+                    continue;
+                }
+                CHECK(above[i] == directions[i]);
+                CHECK(found[i] == pdfs[i]);
+                CHECK(seen[i] == radiances[i]);
+            }
+        }
+        if (width == 64) CHECK(left_out > 100);
+    }
+}
+
 TEST_CASE("environment: wherever there is light there is density, beside a bright pixel too") {
     std::vector<Rgb> pixels(16 * 8, Rgb(0.0f));
     pixels[3 * 16 + 15] = Rgb(0.0f, 0.0f, 1000.0f);

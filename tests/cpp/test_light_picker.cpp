@@ -4,6 +4,7 @@
 #include "frazil/base/parallel.h"
 #include "frazil/base/random.h"
 #include "frazil/base/sampler.h"
+#include "frazil/lighting/group_balance.h"
 #include "lights.h"
 
 using namespace frazil;
@@ -32,6 +33,30 @@ std::vector<Light> swarm(std::uint32_t count) {
         lights.back().radiance = Rgb(10.0f * random_float(i, 4));
         if (i % 17 == 3) lights.back().radiance *= -1.0f;
         if (i % 5 == 4) lights.back().shaping.cone_angle = 40.0f;
+    }
+    return lights;
+}
+
+// Strings of lights along a coast: clusters of unlike size and strength, spots that point every way, the receivers among
+// them.
+std::vector<Light> strings(std::uint32_t count) {
+    std::vector<Light> lights;
+    const float scale = 1.0f / std::sqrt(float(count));
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t cluster = i % 10;
+        const float t = 2.0f * kPi * (float(cluster) + 0.8f * random_float(i, 31)) / 10.0f;
+        const V3f place((2.0f + 0.2f * random_float(i, 32)) * std::cos(t),
+                        (2.0f + 0.2f * random_float(i, 33)) * std::sin(t),
+                        0.4f + 0.5f * random_float(cluster, 34) + 0.1f * random_float(i, 35));
+        M44f turn;
+        turn.setAxisAngle(
+            V3f(random_float(i, 36) - 0.5f, random_float(i, 37) - 0.5f, random_float(i, 38) - 0.5f).normalized(),
+            kPi * random_float(i, 39));
+        LightShape shape = SphereLight{0.1f * scale};
+        if (i % 2 == 1) shape = RectLight{0.3f * scale, 0.1f * scale};
+        lights.push_back(make_light(shape, turn * translated(place)));
+        lights.back().radiance = Rgb(std::pow(10.0f, 2.0f * random_float(i, 40)));
+        if (i % 3 == 2) lights.back().shaping.cone_angle = 60.0f;
     }
     return lights;
 }
@@ -151,10 +176,78 @@ TEST_CASE("light picker: no light that reaches a receiver is left out") {
     }
 }
 
-TEST_CASE("light picker: ten thousand lights are at most three times as noisy as ten") {
+TEST_CASE("light picker: ten thousand lights are at most twice as noisy as ten") {
     const double ten = noise(swarm(10)), many = noise(swarm(10000));
     MESSAGE("noise of one sample: ten lights ", ten, ", ten thousand ", many);
-    CHECK(many < 3.0 * ten);
+    CHECK(many < 2.0 * ten);
+    const double few = noise(strings(10)), strung = noise(strings(10000));
+    MESSAGE("along a coast: ten lights ", few, ", ten thousand ", strung);
+    CHECK(strung < 2.0 * few);
+}
+
+TEST_CASE("light picker: groups are asked as often as their light is uncertain, whatever their strength") {
+    // A sun that a roof with a hole hides from most places, and an open sky.
+    std::vector<Light> lights{make_light(DistantLight{1.0f}), make_light(DomeLight{})};
+    lights[0].group = "sun", lights[1].group = "sky";
+    const RayScene roof({square(1.0f, 5.0f)}, {{0, M44f()}});
+    std::vector<LightReceiver> receivers;
+    for (std::uint32_t i = 0; i < 400; ++i) {
+        receivers.push_back(
+            {V3f(2.4f * random_float(i, 51) - 1.2f, 2.4f * random_float(i, 52) - 1.2f, 0.0f), V3f(0, 0, 1), kNoObject});
+    }
+    const auto shares = [&](float sun, float sky, bool is_balanced) {
+        lights[0].radiance = Rgb(sun), lights[1].radiance = Rgb(sky);
+        LightSampler sampler(lights);
+        if (is_balanced) balance_groups(sampler, roof, receivers);
+        std::array<double, 2> result{};
+        const LightReceiver receiver{V3f(0.1f, 0.2f, 0.0f), V3f(0, 0, 1), kNoObject};
+        GroupPicker::Weights weights;
+        sampler.picker(LightUse::surface).weigh(receiver, weights);
+        for (int i = 0; i < 2; ++i) {
+            result[std::size_t(i)] = double(sampler.picker(LightUse::surface).probability(receiver, weights, i));
+        }
+        return result;
+    };
+    CHECK(shares(1.0f, 1.0f, false)[0] == doctest::Approx(0.5));
+    const auto even = shares(1.0f, 1.0f, true);
+    CHECK(even[0] + even[1] == doctest::Approx(1.0));
+    CHECK(even[0] > 0.55);
+    CHECK(even[1] >= 0.25);
+    for (const auto& [sun, sky] : {std::pair{1e4f, 1.0f}, {-0.35f, 20.0f}}) {
+        const auto graded = shares(sun, sky, true);
+        CHECK(graded[0] == doctest::Approx(even[0]).epsilon(1e-6));
+        CHECK(graded[1] == doctest::Approx(even[1]).epsilon(1e-6));
+    }
+}
+
+TEST_CASE(
+    "light picker: balanced groups are picked as often as they are told, one after the other and several at a time") {
+    std::vector<Light> lights = swarm(60);
+    for (std::size_t i = 0; i < lights.size(); ++i) lights[i].group = i < 40 ? "a" : i < 50 ? "b" : i < 57 ? "c" : "d";
+    LightSampler sampler(lights);
+    std::vector<LightReceiver> receivers;
+    for (std::uint32_t i = 0; i < 50; ++i) receivers.push_back({V3f(random_float(i, 61), 0.0f, 0.0f), V3f(0, 0, 1)});
+    balance_groups(sampler, RayScene({}, {}), receivers);
+    for (const float asked : {1.0f, 2.0f, 3.0f, 6.0f}) {
+        const LightReceiver receiver{V3f(-2.0f, 1.5f, 0.0f), V3f(0, 0, 1), kNoObject, asked};
+        std::vector<double> counted(lights.size(), 0.0);
+        constexpr int kCount = 1 << 14;
+        std::vector<LightSample> samples;
+        for (int i = 0; i < kCount; ++i) {
+            sampler.sample(receiver, (float(i) + 0.5f) / kCount, V2f(0.5f), samples);
+            for (const LightSample& sample : samples) counted[std::size_t(sample.light)] += 1.0 / kCount;
+        }
+        GroupPicker::Weights weights;
+        const GroupPicker& picker = sampler.picker(LightUse::surface);
+        picker.weigh(receiver, weights);
+        double total = 0.0;
+        for (std::size_t i = 0; i < lights.size(); ++i) {
+            const double told = double(picker.probability(receiver, weights, int(i)));
+            total += told;
+            CHECK(std::abs(counted[i] - told) < 4.0 / kCount);
+        }
+        if (asked <= 4.0f) CHECK(total == doctest::Approx(asked).epsilon(1e-3));
+    }
 }
 
 TEST_CASE("crowd: a bake of many lights gives the sum of their own, and the same bits on two threads") {

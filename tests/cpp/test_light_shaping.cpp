@@ -1,6 +1,8 @@
 // Shaping, images on rects and mesh lights against closed forms; mesh sampling against its density.
 #include <doctest/doctest.h>
 
+#include <array>
+
 #include "chi_square.h"
 #include "frazil/base/error.h"
 #include "lights.h"
@@ -87,6 +89,100 @@ TEST_CASE("shaping: focus is a power of the cosine, tinted") {
     }
 }
 
+TEST_CASE("shaping: focus has the absolute cosine: a sphere shines backwards too") {
+    Shaping focus;
+    focus.focus = 2.0f;
+    CHECK(eval(focus, V3f(0.0f, 0.6f, 0.8f)).x == doctest::Approx(0.64));
+    CHECK(eval(focus, V3f(0.0f, 0.6f, -0.8f)).x == doctest::Approx(0.64));
+}
+
+TEST_CASE("ies: a profile multiplies the light by its intensity, angle by angle") {
+    // 100 - degrees candela, by 10 degrees to 80; nothing beyond.
+    std::vector<float> vertical, values;
+    for (int v = 0; v <= 80; v += 10) {
+        vertical.push_back(float(v));
+        values.push_back(100.0f - float(v));
+    }
+    Shaping shaping;
+    shaping.ies = std::make_shared<const IesProfile>(vertical, std::vector<float>{0.0f}, values, "/profile");
+    for (const double degrees : {0.0, 15.0, 44.0, 70.0}) {
+        CAPTURE(degrees);
+        CHECK(irradiance_at({spot(shaping)}, float(std::tan(radians(degrees)))).x ==
+              doctest::Approx((100.0 - degrees) * unshaped(radians(degrees))).epsilon(2e-3));
+    }
+    CHECK(irradiance_at({spot(shaping)}, float(std::tan(radians(83.0)))).x == 0.0f);
+    // Scaled about straight down: at 30 degrees it gives what it had at 60; negative scales go about straight up.
+    shaping.ies_angle_scale = 0.5f;
+    CHECK(irradiance_at({spot(shaping)}, float(std::tan(radians(30.0)))).x ==
+          doctest::Approx(40.0 * unshaped(radians(30.0))).epsilon(2e-3));
+    shaping.ies_angle_scale = -2.0f;
+    CHECK(shaping.ies->eval(V3f(0.0f, 0.0f, -1.0f), -2.0f) == 0.0f);
+    CHECK(shaping.ies->eval(V3f(0.0f, 0.0f, 1.0f), -2.0f) == doctest::Approx(0.0));  // 90 degrees
+}
+
+TEST_CASE("ies: normalised, a profile has a mean of one over what it covers") {
+    // 1 + h/180 over half a turn, mirrored: 1.5 on the mean; a hemisphere, and a sphere with nothing above.
+    for (const float last : {90.0f, 180.0f}) {
+        std::vector<float> vertical{0.0f, 30.0f, 90.0f}, values;
+        if (last > 90.0f) vertical.push_back(last);
+        const std::vector<float> horizontal{0.0f, 45.0f, 180.0f};
+        for (const float h : horizontal) {
+            for (const float v : vertical) values.push_back((1.0f + h / 180.0f) * (1.0f + v / 90.0f));
+        }
+        Shaping shaping;
+        shaping.ies = std::make_shared<const IesProfile>(vertical, horizontal, values, "/profile");
+        shaping.ies_normalize = true;
+        double sum = 0.0;
+        constexpr int kCount = 1 << 15;
+        for (std::uint32_t i = 0; i < kCount; ++i) {
+            Sampler random(3, 4, i);
+            const V2f u = random.next_2d();
+            const float z = last > 90.0f ? 1.0f - 2.0f * u.x : 1.0f - u.x, r = std::sqrt(1.0f - z * z);
+            sum += double(eval(shaping, {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z}).x) / kCount;
+        }
+        CHECK(sum == doctest::Approx(1.0).epsilon(1e-3));
+        if (last == 90.0f) {
+            // ∫ (1 + 2v/pi) sin v dv = 1 + 2/pi.
+            CHECK(double(shaping.ies->mean()) == doctest::Approx(1.5 * (1.0 + 2.0 / kPiD)));
+        }
+    }
+}
+
+TEST_CASE("ies: less than a turn of horizontal angles is mirrored") {
+    const auto at = [](const IesProfile& profile, double degrees) {
+        const double h = radians(degrees);
+        return double(profile.eval({float(std::cos(h)), float(std::sin(h)), 0.0f}));
+    };
+    const auto profile = [](std::vector<float> horizontal) {
+        std::vector<float> values;
+        for (const float h : horizontal) values.insert(values.end(), {h, h});
+        return IesProfile({0.0f, 90.0f}, std::move(horizontal), values, "/profile");
+    };
+    const IesProfile quarter = profile({0, 90}), half = profile({0, 180}), turn = profile({0, 120, 360}),
+                     other = profile({90, 180, 270});
+    for (const auto& [angle, q, h, o] :
+         {std::array<double, 4>{20, 20, 20, 160}, {110, 70, 110, 110}, {200, 20, 160, 200}, {330, 30, 30, 210}}) {
+        CAPTURE(angle);
+        CHECK(at(quarter, angle) == doctest::Approx(q));
+        CHECK(at(half, angle) == doctest::Approx(h));
+        CHECK(at(turn, angle) == doctest::Approx(angle));
+        CHECK(at(other, angle) == doctest::Approx(o));
+    }
+}
+
+TEST_CASE("ies: broken profiles are refused") {
+    const auto make = [](std::vector<float> v, std::vector<float> h, std::vector<float> values) {
+        return IesProfile(std::move(v), std::move(h), std::move(values), "/lamp.ies");
+    };
+    CHECK_THROWS_WITH_AS(make({}, {0}, {}), doctest::Contains("/lamp.ies: vertical angles must be"), ValueError);
+    CHECK_THROWS_WITH_AS(make({0, 0}, {0}, {1, 1}), doctest::Contains("got 0 as number 2"), ValueError);
+    CHECK_THROWS_WITH_AS(make({0, 200}, {0}, {1, 1}), doctest::Contains("within 0 to 180 degrees"), ValueError);
+    CHECK_THROWS_WITH_AS(make({0, 90}, {0, 50}, {1, 1, 1, 1}), doctest::Contains("got 0 to 50"), ValueError);
+    CHECK_THROWS_WITH_AS(make({0, 90}, {0}, {1}), doctest::Contains("one for each pair of angles (2), got 1"),
+                         ValueError);
+    CHECK_THROWS_WITH_AS(make({0, 90}, {0}, {1, -1}), doctest::Contains(">= 0 and finite, got -1"), ValueError);
+}
+
 TEST_CASE("shaping: a cone on a sphere lights one side of it") {
     Light bulb = make_light(SphereLight{0.001f}, translated({0, 0, 1}));
     bulb.shaping.cone_angle = 90.0f;
@@ -120,6 +216,29 @@ TEST_CASE("light image: a rect with one white half gives what that half gives, o
         expected += 100.0 * (2.0 / 256.0) * (2.0 / 1000.0) / (d2 * d2);
     }
     CHECK(irradiance_at({stripe}).x == doctest::Approx(expected).epsilon(0.02));
+}
+
+TEST_CASE("light image: the density of sample() is the one that a ray finds") {
+    std::vector<Rgb> pixels;
+    for (int i = 0; i < 12; ++i) pixels.emplace_back(i % 5 == 1 ? -6.0f : float(i % 3));
+    M44f scale;
+    scale.setScale(V3f(1.0f, 0.5f, 2.0f));
+    const WorldLight world(make_light(RectLight{1.5f, 2.0f, std::make_shared<LightImage>(4, 3, pixels, "/image")},
+                                      scale * translated({0.2f, 0.1f, 0.9f})));
+    const V3f position(0.0f);
+    const auto sample = [&](const V2f& u, V3f& d) {
+        LightSample s;
+        world.sample(position, {&u, 1}, {&s, 1});
+        d = s.direction;
+        return s.pdf > 0.0f;
+    };
+    const auto pdf = [&](const V3f& d) {
+        LightHit seen;
+        return world.intersect(position, d, 1e9f, seen) ? double(seen.pdf) : 0.0;
+    };
+    const auto result = chi_square(sample, pdf, V3f(0, 0, 1), 1.0);
+    CHECK(result.p_value > 1e-4);
+    CHECK(result.mass == doctest::Approx(1.0).epsilon(0.02));
 }
 
 TEST_CASE("mesh light: a square of two triangles is a rect") {

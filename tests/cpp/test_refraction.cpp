@@ -5,6 +5,7 @@
 #include "chi_square.h"
 #include "frazil/base/quadrature.h"
 #include "frazil/material/transmission.h"
+#include "frazil/render/interior.h"
 #include "frazil/render/render.h"
 #include "frazil/translucency/fresnel.h"
 #include "scenes.h"
@@ -167,6 +168,24 @@ TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) bet
     }
     SUBCASE("mirrored") {
         scene.objects[0].local_to_world[0][0] = -1.0f;
+        check(scene);
+    }
+    SUBCASE("with normals that point inwards") {
+        for (const V3f& p : scene.meshes[0].positions) scene.meshes[0].normals.values.push_back(V3f(0, 0, -p.z) * 5.0f);
+        scene.meshes[0].normals.interpolation = Interpolation::vertex;
+        check(scene);
+    }
+    SUBCASE("with an edge that four triangles share, a triangle twice and one without area") {
+        Mesh& mesh = scene.meshes[0];
+        const Mesh other = box_of({9, -9, 0.2f}, {20, 9, 0.6f});  // touches the slab along an edge
+        const int first = int(mesh.positions.size());
+        mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+        for (const V3i& t : other.triangles) mesh.triangles.push_back(t + V3i(first));
+        mesh.triangles.push_back({0, 1, 1});
+        const V3i twice = mesh.triangles[0];
+        mesh.triangles.push_back(twice);
+        mesh.triangles.push_back({twice.x, twice.z, twice.y});  // and back, so that it encloses nothing
+        CHECK(is_closed(mesh));
         check(scene);
     }
     SUBCASE("cut in two overlapping bodies") {

@@ -34,8 +34,9 @@ def inward(axis: int, sign: float) -> np.ndarray:
     return matrix
 
 
-def rects(radiance: float, group: str = "") -> list[fz.Light]:
-    shape = fz.RectLight(2 * HALF, 2 * HALF)
+def rects(radiance: float, group: str = "", image: bool = False) -> list[fz.Light]:
+    white = np.ones((3, 5, 3), np.float32) if image else None
+    shape = fz.RectLight(2 * HALF, 2 * HALF, white, "/white")
     return [
         fz.Light(shape, radiance=[radiance] * 3, matrix=inward(axis, sign), path=f"/rect{axis}{sign}", group=group)
         for axis in range(3)
@@ -86,6 +87,7 @@ def furnace() -> fz.Film:
         pytest.param(lambda: [dome(1.0, image=True)], id="image dome"),
         pytest.param(lambda: [distant(1.0)], id="distant"),
         pytest.param(lambda: rects(1.0), id="rects"),
+        pytest.param(lambda: [*rects(0.6, image=True), distant(0.4)], id="rects with images"),
         pytest.param(lambda: [dome(0.2), dome(0.2, image=True), distant(0.3), *rects(0.3)], id="all"),
         pytest.param(lambda: [dome(1.5), *rects(-0.5)], id="one that takes away"),
         pytest.param(lambda: [dome(0.5), *rects(0.5, "box")], id="two groups"),
@@ -105,6 +107,54 @@ def test_a_shining_box_around_is_the_furnace_too():
     light = fz.Light(fz.MeshLight(mesh, index), radiance=[0.6] * 3, path="/box")
     boxed = render(scene, [light, *rects(0.4)], max_bounces=0)
     check_same(boxed, render(two_balls(), [dome(1.0)], max_bounces=0), layers=("translucency", "diffuse"))
+
+
+def mesh_of(shape: str) -> trimesh.Trimesh:
+    if shape == "sphere":
+        return trimesh.creation.icosphere(4, 0.4)
+    if shape == "rect":
+        return trimesh.Trimesh(
+            [[-0.5, -0.3, 0], [0.5, -0.3, 0], [0.5, 0.3, 0], [-0.5, 0.3, 0]], [[0, 2, 1], [0, 3, 2]], process=False
+        )
+    turns = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+    ring = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    here, beside = np.arange(128), np.roll(np.arange(128), -1)
+    if shape == "disk":
+        corners = np.concatenate([[[0, 0, 0]], np.pad(0.5 * ring, ((0, 0), (0, 1)))])
+        return trimesh.Trimesh(corners, np.stack([0 * here, beside + 1, here + 1], axis=1), process=False)
+    ends = [np.column_stack([np.full(128, x), 0.2 * ring]) for x in (-0.7, 0.7)]
+    sides = [np.stack([here, beside, here + 128], axis=1), np.stack([beside, beside + 128, here + 128], axis=1)]
+    return trimesh.Trimesh(np.concatenate(ends), np.concatenate(sides), process=False)
+
+
+@pytest.mark.parametrize(
+    ("shape", "light"),
+    [
+        ("sphere", fz.SphereLight(0.4)),
+        ("cylinder", fz.CylinderLight(1.4, 0.2)),
+        ("disk", fz.DiskLight(0.5)),
+        ("rect", fz.RectLight(1.0, 0.6)),
+        ("rect", fz.RectLight(1.0, 0.6, np.ones((2, 3, 3), np.float32), "/white")),
+    ],
+    ids=["sphere", "cylinder", "disk", "rect", "rect with an image"],
+)
+def test_a_light_is_as_good_as_the_mesh_of_its_shape(shape, light):
+    # Above the balls, in front, out of sight; it shines down and back.
+    turn = trimesh.transformations.rotation_matrix(np.radians(-60), [1, 0, 0])
+    turn[:3, 3] = (0.2, 2.2, 1.2)
+    matrix = np.ascontiguousarray(turn.T)
+    options = {"max_bounces": 0, "samples": 32}
+    plain = render(two_balls(), [fz.Light(light, radiance=[40.0] * 3, matrix=matrix, path="/light")], **options)
+    scene = two_balls()
+    made = mesh_of(shape)
+    mesh = fz.Mesh(np.asarray(made.vertices, np.float32), np.asarray(made.faces, np.int32))
+    black = scene.add_material("/black", fz.StandardMaterial(diffuse_color=(0.0,) * 3))
+    index = scene.add_object("/mesh", scene.add_mesh(mesh, "/mesh"), black, matrix)
+    lamp = fz.Light(fz.MeshLight(mesh, index), radiance=[40.0] * 3, matrix=matrix, path="/mesh")
+    shown = render(scene, [lamp], **options)
+    assert plain["diffuse"].mean() > 0.01
+    # Lobes without bounces wait for luck: the specular layer has more noise than a mean over a ball bears.
+    check_same(shown, plain, layers=("translucency", "diffuse"))
 
 
 @pytest.mark.parametrize("shape", [fz.SphereLight(0.3), fz.RectLight(1.0, 0.5), fz.DistantLight(3.0)])

@@ -53,6 +53,12 @@ def test_first_lobes_are_the_components(film):
     same(film["through_ice"], film["refraction"])
 
 
+def test_labels_that_name_nothing_are_named():
+    with pytest.warns(fz.FrazilWarning, match=r"lpe a: label must be a light group \(.*key.*got 'kee'.*mean 'key'"):
+        film = render({"a": "C.*<L.'kee'>", "b": "C<RD.'diffuse'>.*"}, resolution=(4, 4), samples=1, bake_samples=1)
+    assert not film["a"].any()
+
+
 def test_labels_are_light_groups_and_objects(film):
     same(film["ice_of_rim"], film["translucency_rim"])
     rim = sum(film[f"{name}_rim"] for name in ice.COMPONENTS)

@@ -7,6 +7,8 @@ from pxr import Gf, Sdf, UsdGeom, UsdLux
 from test_usd_materials import write_image
 from usd_stages import add_quad, load, new_stage
 
+import frazil as fz
+
 
 @pytest.fixture
 def stage(tmp_path):
@@ -167,7 +169,7 @@ def test_dome_images_that_cannot_be_used(stage, tmp_path, problem):
         ("SphereLight", "radius", 0.0, "radius must be > 0, got 0.0"),
         ("RectLight", "width", -1.0, "width must be > 0, got -1.0"),
         ("SphereLight", "intensity", float("inf"), "intensity times color must be finite"),
-        ("PortalLight", None, None, "lights of type PortalLight are not supported"),
+        ("PortalLight", None, None, "portals only guide sampling"),
     ],
 )
 def test_lights_that_cannot_be_used_are_left_out(stage, kind, name, value, said):
@@ -190,11 +192,73 @@ def test_flattened_lights_are_left_out(stage):
 
 def test_what_lights_do_not_support_is_named(stage):
     light = UsdLux.SphereLight.Define(stage, "/Light")
-    UsdLux.ShapingAPI.Apply(light.GetPrim()).CreateShapingIesFileAttr("lamp.ies")
     light.GetPrim().CreateRelationship("light:filters").SetTargets(["/Filter"])
-    said = " ".join(load(stage).warnings)
-    for word in ("IES", "light filters"):
-        assert word in said
+    dome = UsdLux.DomeLight.Define(stage, "/Sky")
+    dome.CreatePortalsRel().SetTargets(["/Window"])
+    said = load(stage).warnings
+    assert "/Light: light filters are not supported. They are left out." in said
+    assert "/Sky: portals only guide sampling, and are not used. The dome shines from everywhere." in said
+
+
+IES = """IESNA:LM-63-2002
+[TEST] none
+TILT=NONE
+1 1000 2 3 1 1 2 0 0 0
+0.5 1 10
+0, 45 90
+0
+10 20
+40
+"""
+
+
+def test_ies_profiles(stage, tmp_path):
+    (tmp_path / "lamp.ies").write_text(IES)
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    shaping = UsdLux.ShapingAPI.Apply(light.GetPrim())
+    shaping.CreateShapingIesFileAttr("lamp.ies")
+    shaping.CreateShapingIesAngleScaleAttr(0.5)
+    shaping.CreateShapingIesNormalizeAttr(True)
+    read = read_light(stage).shaping
+    assert read.ies.vertical == [0, 45, 90]
+    assert read.ies.values == [[10, 20, 40]]  # multiplier 2, ballast 0.5
+    assert (read.ies_angle_scale, read.ies_normalize) == (0.5, True)
+    assert read.cone_angle == 180
+    assert read.ies.intensity((0, 0, -1)) == 10
+    np.testing.assert_allclose(read.ies.intensity((0.5, 0, -(0.75**0.5))), 10 + 10 * 30 / 45, rtol=1e-6)
+    assert read.ies.intensity((0, 0, 1)) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "lamp.ies@ cannot be found"),
+        ("hello", "must be an IES file, got one without a TILT line"),
+        (IES.replace("40", ""), "must hold intensities, got the end of the file"),
+        (IES.replace("20", "x"), "intensities must be numbers, got 'x'"),
+        (IES.replace("3 1 1 2", "3 1 2 2"), "photometric type must be 1 (C), got 2"),
+        (IES.replace("3 1 1 2", "1e9 1 1 2"), "the number of vertical angles must be in 1..100000"),
+        (IES.replace("0, 45 90", "0, 45 45"), "vertical angles must rise"),
+        (IES.replace("10 20", "-10 20"), "intensities must be >= 0"),
+    ],
+)
+def test_broken_ies_profiles_are_named(stage, tmp_path, text, said):
+    if text is not None:
+        (tmp_path / "lamp.ies").write_text(text)
+    light = UsdLux.SphereLight.Define(stage, "/Light")
+    UsdLux.ShapingAPI.Apply(light.GetPrim()).CreateShapingIesFileAttr("lamp.ies")
+    scene = load(stage)
+    (warning,) = scene.warnings
+    assert warning.startswith("/Light: ")
+    assert said in warning
+    assert warning.endswith("The light shines without its profile.")
+    assert scene.lights[0].shaping.ies is None
+
+
+def test_ies_with_tilt(tmp_path):
+    path = tmp_path / "tilted.ies"
+    path.write_text(IES.replace("TILT=NONE", "TILT=INCLUDE\n1\n2\n0 90\n1 0.9"))
+    assert fz.read_ies(path).values == [[10, 20, 40]]
 
 
 def test_shaping(stage):

@@ -1,7 +1,7 @@
 """Render vars whose source is a light path expression, from the stage to the EXR."""
 
 import numpy as np
-from pxr import Gf, Sdf, UsdGeom, UsdRender
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdRender
 from usd_stages import add_quad, new_stage
 
 import frazil as fz
@@ -37,6 +37,26 @@ def test_render_vars_of_lpes_are_layers(tmp_path):
     np.testing.assert_allclose(film["all"], film["beauty"][:, :, :3], rtol=2e-3, atol=1e-5)
     assert film["sky_on_diffuse"].max() > 0.01
     assert not film["none"].any()
+
+
+def test_render_vars_of_occlusion_are_layers(tmp_path):
+    path = stage_with(tmp_path / "o.usda", {})
+    stage = Usd.Stage.Open(str(path))
+    product = UsdRender.Product(stage.GetPrimAtPath("/Render/Product"))
+    for name in ("occlusion", "bent_normal"):
+        var = UsdRender.Var.Define(stage, f"/Render/{name}")
+        var.CreateSourceNameAttr(name)
+        product.CreateOrderedVarsRel().AddTarget(var.GetPath())
+    stage.Save()
+    assert main(["render", str(path), "-o", str(tmp_path / "o.exr"), "--resolution", "16x16", "--samples", "4"]) == 0
+    film = fz.Film.load(tmp_path / "o.exr")
+    assert {"beauty", "occlusion", "bent_normal"} <= set(film)
+    # A quad with nothing around is open, and open along its normal.
+    seen = film["beauty"][:, :, 3] == 1
+    assert seen.any()
+    np.testing.assert_allclose(film["occlusion"][seen], 1.0, atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(film["bent_normal"][seen], axis=1), 1.0, atol=2e-3)
+    assert film["bent_normal"][seen].mean(axis=0)[2] > 0.95
 
 
 def test_a_wrong_lpe_of_a_stage_names_itself_and_the_place(tmp_path, capsys):

@@ -12,6 +12,7 @@ from .._frazil import (
     DiskLight,
     DistantLight,
     DomeLight,
+    IesProfile,
     Light,
     MeshLight,
     RectLight,
@@ -20,9 +21,11 @@ from .._frazil import (
     Shaping,
     SphereLight,
 )
+from ..ies import read_ies
 from .context import ReadContext, is_singular
 from .light_images import read_light_image
 from .linking import LinkReader
+from .textures import resolve
 
 _GREY_DOME = 0.5
 _POINT_RADIUS = 1e-3  # metres, of lights that are told to be points or lines
@@ -165,6 +168,9 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
         "SphereLight": (("radius", 0.5),),
         "CylinderLight": (("length", 1.0), ("radius", 0.5)),
     }.get(kind)
+    if kind == "PortalLight":
+        context.warn(prim.GetPath(), "portals only guide sampling, and are not used. It is left out.")
+        return None
     if sizes is None:
         context.warn(prim.GetPath(), f"lights of type {kind or 'none'} are not supported. It is left out.")
         return None
@@ -221,7 +227,25 @@ def _read_shaping(context: ReadContext, prim: Usd.Prim) -> Shaping:
         cone_softness=_within(context, prim, "shaping:cone:softness", 0.0, 0.0, math.inf),
         focus=_within(context, prim, "shaping:focus", 0.0, 0.0, math.inf),
         focus_tint=_color(context, prim, "shaping:focusTint"),
+        ies=_read_profile(context, prim),
+        ies_angle_scale=_number(context, prim, "shaping:ies:angleScale", 0.0),
+        ies_normalize=bool(_get(context, prim, "shaping:ies:normalize", False)),
     )
+
+
+def _read_profile(context: ReadContext, prim: Usd.Prim) -> IesProfile | None:
+    asset = _get(context, prim, "shaping:ies:file", None)
+    if not isinstance(asset, Sdf.AssetPath) or not asset.path:
+        return None
+    attribute = prim.GetAttribute("inputs:shaping:ies:file") or prim.GetAttribute("shaping:ies:file")
+    try:
+        file = resolve(context, asset, attribute)
+        if not file:
+            raise OSError(f"@{asset.path}@ cannot be found.")
+        return read_ies(file)
+    except (OSError, ValueError) as error:
+        context.warn(prim.GetPath(), f"{error} The light shines without its profile.")
+        return None
 
 
 def _read_shadow(context: ReadContext, prim: Usd.Prim) -> ShadowRules:
@@ -276,12 +300,9 @@ def _rotation_of(matrix: np.ndarray) -> np.ndarray:
 
 def _warn_of_unsupported(context: ReadContext, prim: Usd.Prim) -> None:
     path = prim.GetPath()
-    profile = context.get(prim.GetAttribute("inputs:shaping:ies:file"))
-    if profile is not None and profile.path:
-        context.warn(path, "IES profiles are not supported. The light shines without it.")
     filters = prim.GetRelationship("light:filters")
     if filters and filters.GetTargets():
         context.warn(path, "light filters are not supported. They are left out.")
     portals = prim.GetRelationship("portals")
     if portals and portals.GetTargets():
-        context.warn(path, "portals are not supported. The dome shines from everywhere.")
+        context.warn(path, "portals only guide sampling, and are not used. The dome shines from everywhere.")

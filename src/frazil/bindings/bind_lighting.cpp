@@ -1,4 +1,4 @@
-#include <chrono>
+#include <ctime>
 
 #include <nanobind/stl/pair.h>
 
@@ -177,10 +177,9 @@ void bind_lighting(nb::module_& module) {
             const LightSampler sampler(lights);
             IrradianceOptions options;
             options.samples = samples;
-            const auto clock = [] { return std::chrono::steady_clock::now(); };
             const std::vector<Ray> rays = is_bare ? shadow_rays(set, sampler, options) : std::vector<Ray>();
             nb::gil_scoped_release release;
-            const auto start = clock();
+            const std::clock_t start = std::clock();
             std::uint64_t count = rays.size();
             if (is_bare) {
                 std::vector<std::uint8_t> result(rays.size());
@@ -191,11 +190,11 @@ void bind_lighting(nb::module_& module) {
                 const auto full = [](float) { return 1.0f; };
                 count = bake_irradiance(set, scene, sampler, full, options).rays;
             }
-            const std::chrono::duration<double> seconds = clock() - start;
-            return std::pair(count, seconds.count());
+            return std::pair(count, double(std::clock() - start) / CLOCKS_PER_SEC);
         },
         "points"_a, "scene"_a, "lights"_a, "samples"_a, "is_bare"_a,
-        "(rays, seconds) of a bake, or of tracing the very same rays one by one and nothing else. For bench/.");
+        "(rays, seconds of processor time) of a bake, or of tracing the very same rays one by one and nothing else. "
+        "For bench/.");
 }
 
 }  // namespace frazil

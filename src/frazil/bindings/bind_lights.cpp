@@ -146,24 +146,73 @@ void bind_lights(nb::module_& module) {
         .def(nb::init<std::vector<std::uint32_t>>(), "objects"_a)
         .def_ro("objects", &ObjectSet::objects)
         .def("__len__", [](const ObjectSet& set) { return set.objects.size(); });
+    nb::class_<IesProfile>(
+        module, "IesProfile",
+        "A luminaire's light by direction (IES LM-63, type C), bilinear in the angles; see read_ies.\n\n"
+        "Parameters\n----------\n"
+        "vertical : (V,) degrees that rise within 0 (the light's -z) to 180; beyond them it gives nothing.\n"
+        "horizontal : (H,) degrees, from 0 to 0, 90, 180 or 360, or from 90 to 270: less than a turn is mirrored.\n"
+        "values : (H, V) intensities in candela, >= 0.\n"
+        "path : name for messages.")
+        .def(
+            "__init__",
+            [](IesProfile* self, const std::vector<float>& vertical, const std::vector<float>& horizontal,
+               const std::vector<std::vector<float>>& values, const std::string& path) {
+                std::vector<float> flat;
+                for (const std::vector<float>& row : values) {
+                    if (row.size() != vertical.size()) {
+                        throw ValueError(str(path, ": intensities must be one for each vertical angle (",
+                                             vertical.size(), "), got ", row.size(), "."));
+                    }
+                    flat.insert(flat.end(), row.begin(), row.end());
+                }
+                new (self) IesProfile(vertical, horizontal, std::move(flat), path);
+            },
+            "vertical"_a, "horizontal"_a, "values"_a, "path"_a = "IesProfile")
+        .def_prop_ro("vertical", &IesProfile::vertical)
+        .def_prop_ro("horizontal", &IesProfile::horizontal)
+        .def_prop_ro("values",
+                     [](const IesProfile& profile) {
+                         std::vector<std::vector<float>> rows;
+                         const std::size_t columns = profile.vertical().size();
+                         for (std::size_t h = 0; h < profile.horizontal().size(); ++h) {
+                             const auto first = profile.values().begin() + std::ptrdiff_t(h * columns);
+                             rows.emplace_back(first, first + std::ptrdiff_t(columns));
+                         }
+                         return rows;
+                     })
+        .def_prop_ro("mean", &IesProfile::mean, "Mean intensity over the sphere, or the hemisphere that it covers.")
+        .def(
+            "intensity",
+            [](const IesProfile& profile, const Triple& direction) { return profile.eval(-to_v3f(direction)); },
+            "direction"_a, "Intensity towards a unit direction in the light's own frame; -z is vertical angle 0.");
     nb::class_<Shaping>(
         module, "Shaping",
         "How the light depends on the angle from -z (UsdLuxShapingAPI).\n\n"
         "Parameters\n----------\n"
         "cone_angle : degrees from the axis beyond which nothing shines, 0 to 180; 180 = no cone.\n"
         "cone_softness : >= 0; the part of the angle over which the light fades.\n"
-        "focus : >= 0; exponent of the cosine. focus_tint : RGB that takes the place of what focus removes.")
+        "focus : >= 0; exponent of the cosine. focus_tint : RGB that takes the place of what focus removes.\n"
+        "ies : IesProfile that multiplies the light, None = none. ies_angle_scale : widens (> 1) or narrows (< 1) the\n"
+        "    profile about straight down, negative ones about straight up; 0 = neither.\n"
+        "ies_normalize : divide the profile by its mean.")
         .def(
             "__init__",
-            [](Shaping* self, float cone_angle, float cone_softness, float focus, const Triple& focus_tint) {
-                new (self) Shaping{cone_angle, cone_softness, focus, to_rgb(focus_tint)};
+            [](Shaping* self, float cone_angle, float cone_softness, float focus, const Triple& focus_tint,
+               std::shared_ptr<const IesProfile> ies, float ies_angle_scale, bool ies_normalize) {
+                new (self) Shaping{cone_angle,     cone_softness,   focus,        to_rgb(focus_tint),
+                                   std::move(ies), ies_angle_scale, ies_normalize};
             },
             nb::kw_only(), "cone_angle"_a = 180.0f, "cone_softness"_a = 0.0f, "focus"_a = 0.0f,
-            "focus_tint"_a = Triple{0, 0, 0})
+            "focus_tint"_a = Triple{0, 0, 0}, "ies"_a = nb::none(), "ies_angle_scale"_a = 0.0f,
+            "ies_normalize"_a = false)
         .def_ro("cone_angle", &Shaping::cone_angle)
         .def_ro("cone_softness", &Shaping::cone_softness)
         .def_ro("focus", &Shaping::focus)
-        .def_prop_ro("focus_tint", [](const Shaping& shaping) { return to_triple(shaping.focus_tint); });
+        .def_prop_ro("focus_tint", [](const Shaping& shaping) { return to_triple(shaping.focus_tint); })
+        .def_prop_ro("ies", [](const Shaping& shaping) { return shaping.ies; })
+        .def_ro("ies_angle_scale", &Shaping::ies_angle_scale)
+        .def_ro("ies_normalize", &Shaping::ies_normalize);
     nb::class_<ShadowRules>(module, "ShadowRules",
                             "How a light's shadows depart from opaque ones (UsdLuxShadowAPI).\n\n"
                             "Parameters\n----------\n"

@@ -3,9 +3,8 @@
 //   cell between four centres [PBRT4, Section 12.5], and uniform in solid angle down to the slope within a cell.
 // Units: radiance; directions in the light's own frame: row 0 is +y, the centre of the image +z, and +x lies left of the
 //   centre (OpenEXR's latitude-longitude map, which UsdLuxDomeLight follows).
-// Valid: any image of finite pixels, at least 1 x 1; negative ones subtract; a black one samples uniformly. pdf() is
-//   exact for sample() and nowhere 0 where there is light. Memory: 16 bytes a pixel,
-//   1 KiB a row.
+// Valid: any image of finite pixels, 1 x 1 to kMostPixels; negative ones subtract; a black one samples uniformly. pdf()
+//   is exact for sample() and nowhere 0 where there is light. Memory: 16 bytes a pixel, 1 KiB a row.
 // Not: mip-maps.
 #pragma once
 
@@ -15,28 +14,39 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/lighting/environment_kernel.h"
 
 namespace frazil {
 
 class Environment {
   public:
+    static constexpr std::size_t kMostPixels = std::size_t(1) << 29;  // 32768 x 16384
+
     // Row-major pixels, row 0 on top. ValueError (beginning with `path`) where the size is wrong or a pixel is not
     // finite.
     Environment(int width, int height, std::vector<Rgb> pixels, const std::string& path);
 
-    Rgb eval(const V3f& direction) const;
     // A direction and its solid-angle pdf; its radiance on the way.
     V3f sample(const V2f& u, float& pdf, Rgb& radiance) const;
     V3f sample(const V2f& u, float& pdf) const {
         Rgb radiance;
         return sample(u, pdf, radiance);
     }
-    float pdf(const V3f& direction) const;
-    // Both at once, for the price of one.
+    // Radiance and density of a direction.
     Rgb eval(const V3f& direction, float& pdf) const;
-    // Many of either at once: memory is asked for ahead of its use, which is what large images wait for. The same bits.
+    Rgb eval(const V3f& direction) const {
+        float pdf;
+        return eval(direction, pdf);
+    }
+    float pdf(const V3f& direction) const {
+        float pdf;
+        eval(direction, pdf);
+        return pdf;
+    }
+    // Many of either at once, several times faster; the same bits. Directions that certainly lie behind the plane of
+    // `normal` (zero: none do) are left out, with a pdf of 0.
     void eval_many(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
-    void sample_many(std::span<const V2f> u, std::span<V3f> directions, std::span<float> pdfs,
+    void sample_many(const V3f& normal, std::span<const V2f> u, std::span<V3f> directions, std::span<float> pdfs,
                      std::span<Rgb> radiances) const;
     int width() const { return width_; }
     int height() const { return height_; }
@@ -49,24 +59,7 @@ class Environment {
 
   private:
     void set_moments();
-    // The rectangle between four pixel centres: columns column, column + 1 (around the seam), rows row - 1, row (half a
-    // cell at the poles). `across` and `down` in [0, 1] are the place in it, `down` linear in the angle.
-    struct Cell {
-        int column, row;
-        float across, down;
-        const Rgb* corner[4];  // upper left, upper right, lower left, lower right
-    };
-    Cell cell_of(const V3f& direction) const;
-    Rgb eval_in(const Cell& cell, const V3f& direction, float& pdf) const;
-    const std::uint32_t* guide_of(int row) const;
-    // The steps of sample(): the row, the column, and the place in the cell with what is found there.
-    int sample_row(float u) const;
-    void sample_column(float u, Cell& cell) const;
-    V3f sample_in(Cell& cell, const V2f& u, float& pdf, Rgb& radiance) const;
-    void set_corners(Cell& cell) const;
-    static Rgb radiance_in(const Cell& cell);
-    // `down_cosine` is the place in the cell linear in the cosine.
-    float pdf_in(const Cell& cell, float down_cosine) const;
+    EnvironmentTables tables() const;
 
     int width_, height_;
     std::vector<Rgb> pixels_;

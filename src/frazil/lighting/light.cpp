@@ -118,6 +118,7 @@ void check_shaping(const Light& light) {
             "shaping:cone:softness must be >= 0 and finite", s.cone_softness);
     require(light, s.focus >= 0.0f && std::isfinite(s.focus), "shaping:focus must be >= 0 and finite", s.focus);
     require(light, is_finite(s.focus_tint), "shaping:focusTint must be finite", s.focus_tint.x);
+    require(light, std::isfinite(s.ies_angle_scale), "shaping:ies:angleScale must be finite", s.ies_angle_scale);
 }
 
 void check_shadow(const Light& light) {

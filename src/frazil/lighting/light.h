@@ -7,7 +7,7 @@
 // Valid: finite values; negative radiance subtracts. Rect, disk and distant shine along -z of their frame, sphere and
 //   cylinder (about x, no caps) outwards, a mesh along the normals of its triangles; any invertible light_to_world, a
 //   dome's and a distant light's rotation alone.
-// Not: light filters, IES profiles, portals.
+// Not: light filters, portals.
 #pragma once
 
 #include <memory>

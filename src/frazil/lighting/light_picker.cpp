@@ -7,6 +7,9 @@ namespace frazil {
 namespace {
 
 constexpr int kBins = 12;
+// So many lights are weighed one by one in the choice between two nodes: with few lights a node's estimate is poor, as
+// some shine elsewhere.
+constexpr int kFew = 16;
 constexpr int kMaxDepth = 48;  // beyond it lights are halved by number
 
 V3f center_of(const Box3f& box) {
@@ -122,6 +125,7 @@ int LightPicker::build(std::span<PickEntry> entries, std::uint32_t link, int dep
     const int right = build(entries.subspan(middle), link, depth + 1);
     nodes_[std::size_t(left)].parent = nodes_[std::size_t(right)].parent = index;
     Node& node = nodes_[std::size_t(index)];
+    node.leaves = int(entries.size());
     node.left = left, node.right = right;
     node.bounds = merged(nodes_[std::size_t(left)].bounds, nodes_[std::size_t(right)].bounds);
     return index;
@@ -133,8 +137,14 @@ float LightPicker::node_importance(int index, const LightReceiver& receiver) con
     return node.scale * lights_[std::size_t(node.light)].importance(receiver.position, receiver.normal);
 }
 
+float LightPicker::close_importance(int index, const LightReceiver& receiver) const {
+    const Node& node = nodes_[std::size_t(index)];
+    if (node.leaves == 1 || node.leaves > kFew) return node_importance(index, receiver);
+    return close_importance(node.left, receiver) + close_importance(node.right, receiver);
+}
+
 float LightPicker::left_share(const Node& node, const LightReceiver& receiver) const {
-    const float left = node_importance(node.left, receiver), right = node_importance(node.right, receiver);
+    const float left = close_importance(node.left, receiver), right = close_importance(node.right, receiver);
     return left + right > 0.0f ? left / (left + right) : 0.5f;
 }
 

@@ -1,7 +1,8 @@
 // The choice of one light among many for one receiver.
 // Model: a tree of light bounds [ContyEstevez2018], one for each set of linked objects. The choice begins among the nodes
-//   of a fixed cut, so that up to kCut lights are weighed one by one; lights from infinity always are. Several choices
-//   for one receiver are systematic: what has its share of the weight or more is chosen for certain.
+//   of a fixed cut, so that up to kCut lights are weighed one by one; lights from infinity always are, and below the cut
+//   the last sixteen. Several choices for one receiver are systematic: what has its share of the weight or more is chosen
+//   for certain.
 // Units: probabilities.
 // Valid: thread-safe after construction; the same for any number of threads. Every light that can reach a receiver that
 //   it is linked to has a probability above 0; other objects' lights have none. One float chooses: probabilities below
@@ -77,6 +78,7 @@ class LightPicker {
         LightBounds bounds;
         int parent = -1, left = -1, right = -1;  // no children: a leaf
         int light = -1;
+        int leaves = 1;  // lights of the node
         float scale = 1.0f;
         std::uint32_t link = 0;
     };
@@ -87,6 +89,8 @@ class LightPicker {
     };
     int build(std::span<PickEntry> entries, std::uint32_t link, int depth);
     float node_importance(int node, const LightReceiver& receiver) const;
+    // The same, light by light where the node has few.
+    float close_importance(int node, const LightReceiver& receiver) const;
     // The share of a node's left child.
     float left_share(const Node& node, const LightReceiver& receiver) const;
     // The probability that a slot is chosen.

@@ -55,7 +55,7 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
     }
     world->all = std::make_unique<const LightPicker>(world->lights, all, world->table, world->link_of_light);
     // Uses that weigh the lights alike share a picker.
-    std::map<std::vector<float>, std::shared_ptr<const GroupPicker>> made;
+    std::map<std::vector<float>, std::shared_ptr<GroupPicker>> made;
     for (std::size_t use = 0; use < kLightUseCount; ++use) {
         std::vector<float> scales;
         std::vector<PickEntry> entries;
@@ -65,8 +65,7 @@ LightSampler::LightSampler(const std::vector<Light>& lights) : lights_(lights) {
         }
         auto& picker = made[scales];
         if (!picker) {
-            picker =
-                std::make_shared<const GroupPicker>(world->lights, entries, world->table, world->link_of_light, groups);
+            picker = std::make_shared<GroupPicker>(world->lights, entries, world->table, world->link_of_light, groups);
         }
         world->pickers[use] = picker;
     }

@@ -1,6 +1,7 @@
 // Choosing directions towards lights, with their densities, for direct light and multiple importance sampling.
-// Model: as many lights per receiver as it asks for: their groups evenly (group_picker.h), in these by the irradiance that
-//   a light can give (light_picker.h), then a direction on each (world_light.h).
+// Model: as many lights per receiver as it asks for: their groups by shares that no group's strength changes
+//   (group_picker.h), in these by the irradiance that a light can give (light_picker.h), then a direction on each
+//   (world_light.h).
 // Units: pdf per steradian, the pick included.
 // Valid: thread-safe. Nothing is clamped; negative lights are sampled by absolute power; a light whose multipliers of the
 //   wanted use are 0, or that is not linked to the receiver's object, is never picked.
@@ -78,6 +79,9 @@ class LightSampler {
     const std::vector<std::uint8_t>* casters(int light) const {
         return world().table.members(world().casters_of_light[std::size_t(light)]);
     }
+    // The choice for a use; uses that weigh the lights alike share one. Scales may be set before the sampler is used.
+    GroupPicker& picker(LightUse use) { return *world_->pickers[std::size_t(use)]; }
+    const GroupPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
     // A picker of its own for some of the lights; it lives no longer than this.
     LightPicker make_picker(std::span<const PickEntry> entries) const {
         return {world().lights, entries, world().table, world().link_of_light};
@@ -92,16 +96,15 @@ class LightSampler {
         std::vector<std::uint8_t> is_plain;
         std::vector<int> odd_shadows;  // the lights with extent that are not plain
         std::vector<int> light_of_object;
-        std::array<std::shared_ptr<const GroupPicker>, kLightUseCount> pickers;
+        std::array<std::shared_ptr<GroupPicker>, kLightUseCount> pickers;
         std::unique_ptr<const LightPicker> all;  // whatever the multipliers: for rays that run into lights
     };
     const World& world() const { return *world_; }
     // Until the thread's next call.
     const std::vector<LightPick>& pick_all(const LightReceiver& receiver, float u, LightUse use) const;
-    const GroupPicker& picker(LightUse use) const { return *world().pickers[std::size_t(use)]; }
 
     std::vector<Light> lights_;
-    std::shared_ptr<const World> world_;
+    std::shared_ptr<World> world_;
 };
 
 }  // namespace frazil

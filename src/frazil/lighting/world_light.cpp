@@ -139,21 +139,27 @@ WorldLight::WorldLight(const Light& light) {
     shape_ = std::visit(Builder(light, extent_, bounds_), light.shape);
     shaping_ = light.shaping;
     is_shaped_ = is_finite() && !shaping_.is_neutral();
-    axis_ = -row(light.light_to_world, 2).normalized();
+    const M44f& m = light.light_to_world;
+    frame_[2] = row(m, 2).normalized();
+    frame_[0] = (row(m, 0) - frame_[2] * frame_[2].dot(row(m, 0))).normalized();
+    frame_[1] = frame_[2].cross(frame_[0]);
+    if (frame_[1].dot(row(m, 1)) < 0.0f) frame_[1] = -frame_[1];
+    const V3f axis = -frame_[2];
     if (const Rect* rect = std::get_if<Rect>(&shape_); rect && rect->image) {
         brightness_ *= std::max(rect->image->brightness(), 1e-3f);
     }
     if (const MeshEmitter* mesh = std::get_if<MeshEmitter>(&shape_)) brightness_ *= mesh->brightness();
     bounds_.power = brightness_ * extent_.projected_area;
+    if (shaping_.ies && !shaping_.ies_normalize) bounds_.power *= shaping_.ies->mean();
     bounds_.center = (bounds_.box.min + bounds_.box.max) * 0.5f;
     if (is_shaped_ && shaping_.has_cone() && shaping_.cone_angle < 90.0f) {
         // No light leaves farther from the axis than the cone's angle, whatever the normal.
         const float angle = shaping_.cone_angle * (kPi / 180.0f) + 0.01f;
-        bounds_.axis = axis_;
+        bounds_.axis = axis;
         bounds_.cos_spread = std::cos(angle);
         bounds_.cos_emission = 1.0f - 1e-4f;
         bounds_.beamed = bounds_.power;
-        bounds_.beam = axis_ * bounds_.power;
+        bounds_.beam = axis * bounds_.power;
         bounds_.beam_angle = bounds_.power * angle;
     } else if (extent_.normal != V3f(0.0f)) {
         bounds_.flow = extent_.normal * bounds_.power;
@@ -244,7 +250,9 @@ float WorldLight::importance(const V3f& position, const V3f& normal) const {
     if (is_shaped_ && distance > radius) {
         // As seen from the light's middle; what a part of the light may send beyond the cone from there is a bound's.
         if (frazil::importance(bounds_, position, V3f(0.0f)) == 0.0f) return 0.0f;
-        facing *= std::max(luminance(shaped(to_light / distance)), 0.02f);
+        // Where the middle sends nothing, the edge may: a little of what the light gives elsewhere.
+        const float mean = shaping_.ies && !shaping_.ies_normalize ? shaping_.ies->mean() : 1.0f;
+        facing *= std::max(luminance(shaped(to_light / distance)), 0.02f * mean);
     }
     return receiving * brightness_ * (extent_.projected_area / d) * (facing / d);
 }

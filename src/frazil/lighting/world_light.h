@@ -63,7 +63,10 @@ class WorldLight {
     bool is_uniform_dome() const;
     // Radiance of a dome in a direction; only where is_dome().
     Rgb dome_radiance(const V3f& direction) const;
-    // The same for many, with the densities of sample(); only for a dome with an image.
+    // sample() for a place that receives on the side of `normal`: directions from behind may come with a pdf of 0. Only
+    // for a dome with an image.
+    void sample_dome(const V3f& normal, std::span<const V2f> u, std::span<LightSample> out) const;
+    // The radiances of many, with the densities of sample(); only for a dome with an image.
     void dome_radiances(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
 
   private:
@@ -111,7 +114,9 @@ class WorldLight {
     V2f image_place(const Rect& rect, const V3d& local_offset, const V3f& at) const;
     float image_pdf(const Rect& rect, const V2f& place, const V3f& to_light) const;
     // What shaping leaves of light that travels to the receiver against `direction`.
-    Rgb shaped(const V3f& direction) const { return eval(shaping_, -direction.dot(axis_)); }
+    Rgb shaped(const V3f& direction) const {
+        return eval(shaping_, {direction.dot(frame_[0]), direction.dot(frame_[1]), direction.dot(frame_[2])});
+    }
 
     void sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
     void sample_from(const Distant& distant, const V3f& position, std::span<const V2f> u,
@@ -138,7 +143,7 @@ class WorldLight {
     LightBounds bounds_;
     Shaping shaping_;
     bool is_shaped_ = false;
-    V3f axis_;  // of the shaping, the light's -z
+    V3f frame_[3];  // of the shaping: the light's axes, orthonormal; it shines along the last one's opposite
     std::variant<Dome, Distant, Rect, Disk, Sphere, Cylinder, MeshEmitter> shape_;
 };
 

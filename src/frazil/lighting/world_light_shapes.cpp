@@ -47,23 +47,32 @@ bool enter_unit_ball(const V3f& o, const V3f& d, float& t) {
 // ---- dome ----
 
 void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> u, std::span<LightSample> out) const {
-    if (!dome.image) {
-        for (std::size_t i = 0; i < u.size(); ++i) {
-            out[i].direction = uniform_sphere(u[i]);
-            out[i].radiance = radiance_;
-            out[i].pdf = 0.25f * kInvPi;
-        }
+    if (dome.image) {
+        sample_dome(V3f(0.0f), u, out);
         return;
     }
+    for (std::size_t i = 0; i < u.size(); ++i) {
+        out[i].direction = uniform_sphere(u[i]);
+        out[i].radiance = radiance_;
+        out[i].pdf = 0.25f * kInvPi;
+    }
+}
+
+void WorldLight::sample_dome(const V3f& normal, std::span<const V2f> u, std::span<LightSample> out) const {
+    const Dome& dome = std::get<Dome>(shape_);
+    const V3f local_normal(normal.dot(dome.x), normal.dot(dome.y), normal.dot(dome.z));
     constexpr std::size_t kBatch = 64;
     V3f local[kBatch];
     Rgb radiances[kBatch];
     float pdfs[kBatch];
     for (std::size_t begin = 0; begin < u.size(); begin += kBatch) {
         const std::size_t count = std::min(kBatch, u.size() - begin);
-        dome.image->sample_many(u.subspan(begin, count), {local, count}, {pdfs, count}, {radiances, count});
+        dome.image->sample_many(local_normal, u.subspan(begin, count), {local, count}, {pdfs, count},
+                                {radiances, count});
         for (std::size_t i = 0; i < count; ++i) {
             LightSample& sample = out[begin + i];
+            sample = LightSample();
+            if (pdfs[i] == 0.0f) continue;
             sample.direction = dome.x * local[i].x + dome.y * local[i].y + dome.z * local[i].z;
             sample.radiance = radiances[i] * radiance_;
             sample.pdf = pdfs[i];

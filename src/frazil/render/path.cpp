@@ -203,7 +203,9 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     Scattering value = shader.eval(wo, wi);
     if (!(value.pdf > 0.0f)) return false;
     value.scale(Rgb(1.0f / (value.pdf * odds)));
-    path.add_blur(luminance(value.diffuse) > luminance(value.specular) ? kDiffuseBlur : shader.alpha());
+    const bool is_diffuse = luminance(value.diffuse) > luminance(value.specular);
+    path.add_blur(is_diffuse ? kDiffuseBlur : shader.alpha());
+    path.spread += is_diffuse ? kDiffuseSpread : lobe_spread(shader.alpha());
     const float picks = path.light_picks();
     path.scatter(value, surface.object);
     path.receive(surface, surface.horizon, LightUse::surface, picks);
@@ -212,7 +214,6 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     path.has_direct_light = path.sees_lamps = true;
     path.is_glossy = shader.is_glossy();
     path.light_share = Rgb(1.0f);
-    path.spread += kScatteredSpread;
 
     // Russian roulette on what the path may still bring.
     if (path.scattered > kBouncesBeforeRoulette) {

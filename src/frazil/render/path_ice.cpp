@@ -27,11 +27,6 @@ float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
     return alpha_from_roughness(ice.refraction_roughness + std::max(0.0f, roughness - bare));
 }
 
-// How much wider a lobe makes the cone that a path stands for, per metre.
-float lobe_spread(float alpha) {
-    return 0.5f * alpha;
-}
-
 }  // namespace
 
 IceCore PathTracer::core_at(const Surface& surface, int body, bool from_inside) const {

@@ -99,7 +99,7 @@ bool PathTracer::meet_sheet(Path& path, const V3f& position, const V3f& normal, 
     path.has_direct_light = path.sees_lamps = true;
     path.is_glossy = false;
     path.light_share = Rgb(1.0f);
-    path.spread += kScatteredSpread;
+    path.spread += kDiffuseSpread;
     path.add_blur(kDiffuseBlur);
     path.ray = {position, wi};
     IceCore core = path.core;

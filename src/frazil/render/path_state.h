@@ -28,8 +28,13 @@ constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384
 // Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
 // for what is left.
 constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
-// How much wider an opaque surface makes the cone that a path stands for, per metre.
-constexpr float kScatteredSpread = 0.05f;
+// How much wider a diffuse lobe makes the cone that a path stands for, per metre: a sample stands for some percent of the
+// hemisphere.
+constexpr float kDiffuseSpread = 0.2f;
+// The same for a glossy lobe.
+inline float lobe_spread(float alpha) {
+    return 0.5f * alpha;
+}
 // Lights that are asked at a first vertex, about: one that gives a third of the light or more is asked every time.
 constexpr float kFirstPicks = 3.0f;
 

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
 
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
+#include "frazil/lighting/group_balance.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
@@ -16,6 +18,7 @@
 #include "frazil/render/openness.h"
 #include "frazil/render/overlay_layers.h"
 #include "frazil/render/path.h"
+#include "frazil/render/receivers.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -211,26 +214,35 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
                              const Checkpoints* checkpoints) {
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
-    const LightSampler lights(scene.lights);
+    LightSampler lights(scene.lights);
+    const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
+    balance_groups(lights, ray_scene, receivers_in_view(scene.camera, aspect, ray_scene));
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);
     std::optional<Openness> openness;
-    const auto plant = [&](const std::vector<LitPoints>& lit) {
+    const auto plant = [&](const std::vector<LitPoints>& lit, const std::function<void(std::size_t)>& has_taken) {
         const double paths = double(options.width) * options.height * options.samples;
         plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
-                    {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats);
-        if (layout.has("overlay")) plant_overlay_trees(scene, lit, groups.size(), bodies);
+                    {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
             openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
         }
     };
+    const bool has_overlays = layout.has("overlay");
     if (baked) {
         check_bake(scene, *baked);
-        plant(baked->bodies);
+        plant(baked->bodies, [](std::size_t) {});
+        if (has_overlays) plant_overlay_trees(scene, baked->bodies, groups.size(), bodies);
     } else {
-        plant(make_bake(scene, ray_scene, bodies, options, {}, stats, progress).bodies);
+        Bake bake = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
+        plant(bake.bodies, [&](std::size_t object) {
+            if (has_overlays) return;
+            bake.bodies[object].irradiance = {};
+            bake.bodies[object].moments = {};
+        });
+        if (has_overlays) plant_overlay_trees(scene, bake.bodies, groups.size(), bodies);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
