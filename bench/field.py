@@ -36,7 +36,7 @@ def main() -> None:
     film = fz.render(scene, spacing=options.spacing, **settings)
     peak, seconds, points = peak_bytes(), time.process_time() - clock, film.stats["points"]
     print(
-        f"{points / 1e6:.2f} M points in effect, {len(film.light_groups)} light groups: {before / 1e9:.2f} GB before, "
+        f"{points / 1e6:.2f} M points in effect, {len(scene.lights)} lights: {before / 1e9:.2f} GB before, "
         f"{peak / 1e9:.2f} GB at the peak, {(peak - before) / points:.0f} bytes a point; "
         f"{seconds:.0f} s of processor time ({', '.join(f'{k} {v:.0f}' for k, v in film.stats['seconds'].items())})"
     )

@@ -24,6 +24,9 @@ def translucency(mesh: fz.Mesh, spacing: float, estimator: str, bake_samples: in
     matrix[:3, :3] = np.linalg.qr(np.array([[0.3, 0.8, 0.5], [1, 0, 0], [0, 1, 0]]).T)[0][:, [1, 2, 0]].T
     scene.add_light(fz.Light(fz.DistantLight(0.0), radiance=[3.0, 2.7, 2.2], matrix=matrix, path="/sun"))
     scene.add_light(fz.Light(fz.DomeLight(), radiance=[0.1, 0.1, 0.1], path="/sky"))
+    eye = np.eye(4)
+    eye[3, :3] = mesh.positions.mean(0) + np.float32([0.0, 0.0, 2.0])
+    scene.camera = fz.Camera(matrix=eye, focal_length=50.0, horizontal_aperture=25.0, vertical_aperture=25.0)
     film = fz.render(
         scene, resolution=(64, 64), samples=16, spacing=spacing, estimator=estimator, bake_bounces=0,
         bake_samples=bake_samples, pixel_filter="box",

@@ -71,7 +71,7 @@ def main() -> None:
         image, alpha = film["translucency"][..., :3], film["beauty"][..., 3]
         ratio = tip_over_flank(image, alpha)
         print(f"{mode:<8} tips over flanks, R G B: " + " ".join(f"{v:.2f}" for v in ratio))
-        shown = np.where(alpha[..., None] > 0, image, 0.08)
+        shown = image + 0.08 * (1 - alpha[..., None])
         axis.imshow(np.clip(0.8 * shown, 0, 1) ** (1 / 2.2))
         axis.set_title({"off": "off", "ratio": "ratio", "depth": "depth (default)"}[mode])
         axis.axis("off")
