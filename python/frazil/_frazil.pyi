@@ -1943,7 +1943,9 @@ class Bake:
         """Objects of the scene."""
 
     def points(self, index: int) -> PointSet:
-        """The PointSet of an object; empty where it is not ice."""
+        """
+        A copy of the PointSet of an object, in the world; empty where it is not ice.
+        """
 
     def irradiance(self, index: int) -> NDArray[numpy.float32]:
         """

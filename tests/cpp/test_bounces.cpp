@@ -40,6 +40,32 @@ TEST_CASE("furnace of two white spheres: ice lights ice until it cannot be told 
     CHECK(mean_inside(render(scene, options).film, "translucency", 0) < 0.97);
 }
 
+TEST_CASE("furnace of two white spheres with a boundary: every point gets what an open sky would send") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.31f, 0.3f, CompensationMode::conserve));
+    M44f beside;
+    beside.translate(V3f(0.0f, 2.01f, 0.0f));
+    scene.objects.push_back({"/other", 0, 0, beside});
+    scene.lights = {dome(Rgb(1.0f))};
+    RenderOptions options = small();
+    options.bake_bounces = 8;
+    options.bake_samples = 256;
+    options.spacing = 0.08f;
+    const auto bodies = make_bodies(scene);
+    const float open = kPi * bodies[0]->transmittance_average(0.3f);
+    const LitPoints lit = bake(scene, options).bake.bodies[0];
+    const PointSet points = lit.points.in_world();
+    double near = 0.0, all = 0.0;
+    int count = 0;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        all += lit.irradiance[k].x / (open * double(points.size()));
+        if (points.positions[k].y < 0.9f) continue;
+        near += lit.irradiance[k].x / open;
+        ++count;
+    }
+    CHECK(all == doctest::Approx(1.0).epsilon(0.003));
+    CHECK(near / count == doctest::Approx(1.0).epsilon(0.01));  // between the two; 0.9 without what ice reflects
+}
+
 TEST_CASE("a convex body alone sees no ice: bounces change no bit") {
     Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(0.2f), 1.31f, 0.3f, CompensationMode::ratio));
     scene.lights = {dome(Rgb(0.3f, 0.4f, 0.6f)), rect_above(5.0f, "key")};

@@ -19,7 +19,7 @@ struct LitBall {
     explicit LitBall(const Ramp& ramp = {}) {
         std::get<IceMaterial>(scene.materials[0].model).ramp = ramp;
         std::vector<LitPoints> lit(1);
-        lit[0].points = points;
+        lit[0].points = PlacedPoints(points);
         for (const V3f& n : points.normals) {
             lit[0].irradiance.push_back(Rgb(std::max(0.0f, n.x), 0.2f, n.x > 0.0f ? 1.0f : 0.0f));
         }

@@ -56,6 +56,21 @@ TEST_CASE("thickness: a thin slab absorbs sigma_a times its mean chord, twice it
     CHECK(gain.z == doctest::Approx(1.0f).epsilon(1e-4));
 }
 
+TEST_CASE("thickness: chords of a closed body end at its own other side, whatever stands in it") {
+    const Medium medium{Rgb(5.0f), Rgb(0.02f, 0.005f, 0.001f), 1.0f};
+    Mesh sheet = slab(0.05f, false);
+    for (V3f& p : sheet.positions) p.y -= 0.03f;
+    const RayScene scene({slab(0.1f), sheet}, {Placement{0, M44f()}, Placement{1, M44f()}});
+    const std::vector<std::uint8_t> itself = {1, 0};
+    const auto mean = [&](PlacementMask mask) {
+        Rgb sum(0.0f);
+        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), nullptr, mask)) sum += gain / 64.0f;
+        return sum;
+    };
+    CHECK(mean(&itself) == mean_gain(slab(0.1f), medium));
+    CHECK(mean(nullptr).x > 1.002f * mean(&itself).x);
+}
+
 TEST_CASE("thickness: what is thick against its absorption, or has no other side, returns what a plane does") {
     const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.31f};
     for (const Mesh& mesh : {slab(30.0f), slab(0.01f, false)}) {

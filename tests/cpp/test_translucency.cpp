@@ -77,17 +77,16 @@ TEST_CASE("gather kernel: SIMD equals the scalar path, for every instruction set
     const Profile profile = Dipole(kMedium);
     const KernelTable table = tabulate(profile);
     Ramp ramp{{0.0f, 0.05f, 0.3f}, {Rgb(1.0f, 0.0f, 0.2f), Rgb(0.3f, 1.0f, 0.5f), Rgb(2.0f)}, false};
-    constexpr std::size_t groups = 2;
+    constexpr std::size_t groups = 5;
     SourceList list;
     const PointSet points = sphere_points(100, 0.2f);
     for (const V3f& p : points.positions) {
-        list.sources.push_back({{p.x, p.y, p.z},
-                                {1e-4f, 2e-4f, 1e-4f, 5e-5f, -3e-5f, 1e-5f},
-                                4e-4f,
-                                {0.01f, -0.005f, 0.0f},
-                                0.005f,
-                                {0.1f, 0.2f, 0.3f}});
-        for (std::size_t c = 0; c < 3 * groups; ++c) list.powers.push_back(0.01f * (1.0f + c) * (1.5f + p.z));
+        list.sources.push_back(
+            {{p.x, p.y, p.z}, {1e-4f, 2e-4f, 1e-4f, 5e-5f, -3e-5f, 1e-5f}, 4e-4f, 0.005f, {0.1f, 0.2f, 0.3f}});
+        for (std::size_t g = 0; g < groups; ++g) {
+            const float power = 0.01f * (1.0f + g) * (1.5f + p.z);
+            list.powers.push_back({{power, 2.0f * power, 3.0f * power}, {0.01f, -0.005f, 0.002f * g}});
+        }
     }
     for (const std::int64_t target : {HWY_SSSE3, HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
         if (!(hwy::SupportedTargets() & target)) continue;

@@ -226,11 +226,11 @@ void bind_bake(nb::module_& module) {
             "__len__", [](const Bake& bake) { return bake.bodies.size(); }, "Objects of the scene.")
         .def(
             "points",
-            [](const Bake& bake, std::size_t index) -> const PointSet& {
+            [](const Bake& bake, std::size_t index) {
                 if (index >= bake.bodies.size()) throw nb::index_error();
-                return bake.bodies[index].points;
+                return bake.bodies[index].points.in_world();
             },
-            "index"_a, nb::rv_policy::reference_internal, "The PointSet of an object; empty where it is not ice.")
+            "index"_a, "A copy of the PointSet of an object, in the world; empty where it is not ice.")
         .def(
             "irradiance",
             [](nb::handle self, std::size_t index) {
@@ -262,7 +262,7 @@ void bind_bake(nb::module_& module) {
                 }
                 const auto* values = reinterpret_cast<const Rgb*>(irradiance.data());
                 LitPoints& lit = bake.bodies.emplace_back();
-                lit.points = points;
+                if (points.size() > 0) lit.points = PlacedPoints(points);
                 lit.irradiance.assign(values, values + points.size() * bake.groups.size());
                 if (!moments) return;
                 if (moments->size() != irradiance.size()) {

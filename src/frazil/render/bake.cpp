@@ -54,14 +54,6 @@ M44f stretch_of(const M44f& m) {
     return result;
 }
 
-PointSet moved(const PointSet& points, const M44f& matrix) {
-    PointSet result = points;
-    const M44f inverse = matrix.inverse();
-    for (V3f& position : result.positions) position = position * matrix;
-    for (V3f& normal : result.normals) normal = transform_normal(normal, inverse);
-    return result;
-}
-
 // The largest value of a texture on a mesh, by samples of all triangles.
 float largest_on(const Mesh& mesh, const MaterialInput<float>& texture) {
     constexpr double kSamples = 1 << 16;
@@ -128,7 +120,7 @@ PointSpacing spacing_on(const Scene& scene, const Object& object, float constant
 struct Shape {
     M44f stretch;
     double area;
-    std::map<float, PointSet> points;  // by spacing
+    std::map<float, std::shared_ptr<PointCloud>> points;  // by spacing
 };
 
 class Shapes {
@@ -144,30 +136,27 @@ class Shapes {
         return shapes_.emplace(object.mesh, Shape{stretch, surface_area(mesh), {}})->second;
     }
 
-    // In the world, for an object of that shape.
-    PointSet points_of(const Object& object, Shape& shape, float spacing, const RenderOptions& options,
-                       Progress* progress) {
+    // For an object of that shape.
+    PlacedPoints points_of(const Object& object, Shape& shape, float spacing, const RenderOptions& options,
+                           Progress* progress) {
         const M44f to_world = shape.stretch.inverse() * object.local_to_world;
         const PointSpacing wanted = spacing_on(scene_, object, spacing, options);
-        if (wanted.anywhere) return moved(place(object, shape, wanted.anywhere, options, progress), to_world);
-        if (!wanted.at_vertices.empty()) {
-            return moved(place(object, shape, wanted.at_vertices, options, progress), to_world);
-        }
-        auto known = shape.points.find(spacing);
-        if (known == shape.points.end()) {
-            known = shape.points.emplace(spacing, place(object, shape, spacing, options, progress)).first;
-        }
-        return moved(known->second, to_world);
+        if (wanted.anywhere) return {place(object, shape, wanted.anywhere, options, progress), to_world};
+        if (!wanted.at_vertices.empty()) return {place(object, shape, wanted.at_vertices, options, progress), to_world};
+        auto& known = shape.points[spacing];
+        if (!known) known = place(object, shape, spacing, options, progress);
+        return {known, to_world};
     }
 
   private:
     template <class Spacing>
-    PointSet place(const Object& object, const Shape& shape, const Spacing& spacing, const RenderOptions& options,
-                   Progress* progress) const {
+    std::shared_ptr<PointCloud> place(const Object& object, const Shape& shape, const Spacing& spacing,
+                                      const RenderOptions& options, Progress* progress) const {
         const PoissonOptions poisson{options.seed, true, 0};
         const Mesh mesh = transformed(scene_.meshes[object.mesh], shape.stretch);
-        return place_in_rest(mesh, poisson.thin_walls,
-                             [&](const Mesh& rest) { return poisson_points(rest, spacing, poisson, progress); });
+        return std::make_shared<PointCloud>(place_in_rest(mesh, poisson.thin_walls, [&](const Mesh& rest) {
+            return poisson_points(rest, spacing, poisson, progress);
+        }));
     }
 
     const Scene& scene_;
@@ -218,23 +207,28 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         IrradianceOptions bake_options{options.bake_samples, options.seed};
         bake_options.objects = {static_cast<std::uint32_t>(i)};
         bake_options.error = options.bake_error;
+        const PointSet in_world = lit[i].points.in_world();
         Mesh mesh;
+        std::shared_ptr<const Cells> cells;
         if (options.gather.estimator == Estimator::noise_free) {
-            const Object& object = scene.objects[i];
-            mesh = transformed(scene.meshes[object.mesh], object.local_to_world);
+            PointCloud& cloud = lit[i].points.cloud();
             // No more than shadow rays; fewer where points are so many that their cells are small.
-            const int places = std::clamp(static_cast<int>(kMostPlaces / lit[i].points.size()), 8,
+            const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), 8,
                                           std::clamp(options.bake_samples, 8, 256));
-            if (!lit[i].cells) lit[i].cells = std::make_shared<const Cells>(cells_of(lit[i].points, mesh, places));
-            bake_options.cells = {lit[i].cells.get(), &mesh};
+            cloud.add_cells(true, [&](const PointSet& points) {
+                return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), places);
+            });
+            cells = cloud.cells();
+            mesh = transformed(scene.meshes[scene.objects[i].mesh], scene.objects[i].local_to_world);
+            bake_options.cells = {cells.get(), &mesh};
         }
         Irradiance irradiance = bake_irradiance(
-            lit[i].points, ray_scene, lights,
+            in_world, ray_scene, lights,
             [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
             progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;
-        keep_entering(resolver.entering(static_cast<std::uint32_t>(i), lit[i].points), irradiance);
+        keep_entering(resolver.entering(static_cast<std::uint32_t>(i), in_world), irradiance);
         lit[i].irradiance = std::move(irradiance.values);
         lit[i].moments = std::move(irradiance.moments);
     }
@@ -309,6 +303,11 @@ Bake make_bake(const Scene& scene, const RayScene& ray_scene, const std::vector<
     const std::size_t groups = bake.groups.size();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         LitPoints& lit = bake.bodies[i];
+        if (!wanted.empty() && fresh_groups == bake.groups) {
+            lit.irradiance = std::move(fresh[i].irradiance);
+            lit.moments = std::move(fresh[i].moments);
+            continue;
+        }
         lit.irradiance.assign(lit.points.size() * groups, Rgb(0.0f));
         lit.moments.assign(options.gather.estimator == Estimator::noise_free ? lit.irradiance.size() : 0, V3f(0.0f));
         for (std::size_t g = 0; g < groups; ++g) {
@@ -323,13 +322,10 @@ Bake make_bake(const Scene& scene, const RayScene& ray_scene, const std::vector<
                 copy_group(fresh[i].moments, from, columns, lit.moments, g, groups);
             }
         }
+        fresh[i] = {};
     }
-    // Places are of use to the bake alone.
     for (LitPoints& lit : bake.bodies) {
-        if (!lit.cells) continue;
-        Cells moments = *lit.cells;
-        moments.places = {};
-        lit.cells = std::make_shared<const Cells>(std::move(moments));
+        if (lit.points.size() > 0) lit.points.cloud().drop_places();
     }
     return bake;
 }

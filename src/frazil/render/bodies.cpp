@@ -39,7 +39,11 @@ Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     std::vector<std::unique_ptr<Body>> bodies(scene.objects.size());
     std::map<float, std::shared_ptr<const DielectricAlbedo>> boundaries;  // by eta
-    std::map<std::pair<const IceMaterial*, bool>, std::optional<Profile>> profiles;
+    struct Shared {
+        std::optional<Profile> profile;
+        std::shared_ptr<const TreeKernel> kernel, plain_kernel;
+    };
+    std::map<std::pair<const IceMaterial*, bool>, Shared> shared;
     std::map<std::uint32_t, bool> closed;  // by mesh, of those that it matters for
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const auto* material = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
@@ -55,10 +59,13 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             is_traced = found->second;
         }
         const double traced = is_traced ? material->volume : 0.0;
-        auto& profile = profiles[{material, is_traced}];
-        if (!profile) profile = make_profile(material->profile, medium, 1.0 - traced);
-        bodies[i] =
-            std::make_unique<Body>(Body{material, boundary, *profile, albedo(*profile), nullptr, nullptr, nullptr});
+        auto& [profile, kernel, plain_kernel] = shared[{material, is_traced}];
+        if (!profile) {
+            profile = make_profile(material->profile, medium, 1.0 - traced);
+            plain_kernel = make_tree_kernel(*profile);
+            kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
+        }
+        bodies[i] = std::make_unique<Body>(material, boundary, *profile, kernel, plain_kernel);
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
@@ -70,11 +77,56 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     return bodies;
 }
 
-std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
-                                                     const RayScene& ray_scene, const Shells* shells) {
+Mesh mesh_at_cloud(const Scene& scene, std::size_t object, const PlacedPoints& points) {
+    const Object& placed = scene.objects[object];
+    return transformed(scene.meshes[placed.mesh], placed.local_to_world * points.to_cloud());
+}
+
+std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shared_ptr<const TreeKernel> kernel,
+                                           const std::vector<Rgb>& irradiance, std::size_t groups,
+                                           std::vector<V3f> moments) {
+    return std::make_shared<const PointTree>(points.cloud().clusters(), std::move(kernel), irradiance, groups,
+                                             points.into_cloud(std::move(moments)));
+}
+
+bool ThicknessTrees::is_shared(std::size_t leader) {
+    if (sets_.shells(leader)) return false;
+    const auto [found, is_new] = is_closed_.try_emplace(scene_.objects[leader].mesh, false);
+    if (is_new) found->second = is_closed(scene_.meshes[scene_.objects[leader].mesh]);
+    return found->second;
+}
+
+std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
+    const PlacedPoints& points = sets_.points(leader);
     if (points.size() == 0) return nullptr;
-    return std::make_unique<const PointTree>(
-        points, thickness_gain(points, ray_scene, body.material->medium, body.traced_once, shells), 1, body.profile);
+    const Body& body = *bodies_[leader];
+    std::vector<std::uint8_t> itself(leader + 1, 0);
+    itself[leader] = 1;
+    const auto make = [&](PlacementMask mask) {
+        return make_tree(points, body.plain_kernel,
+                         thickness_gain(points.in_world(), ray_scene_, body.material->medium, body.traced_once,
+                                        sets_.shells(leader), mask),
+                         1);
+    };
+    if (!is_shared(leader)) return make(nullptr);
+    auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
+    if (!shared) shared = make(&itself);
+    return shared;
+}
+
+std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::size_t leader,
+                                                                        const GatherOptions& options) {
+    const PlacedPoints& points = sets_.points(leader);
+    const auto make = [&] {
+        const std::vector<V3f>& positions = points.cloud().points().positions;
+        return std::make_shared<const std::vector<Rgb>>(
+            thickness_gains(of(leader).get(), positions.data(), positions.size(), options));
+    };
+    if (points.size() == 0) return std::make_shared<const std::vector<Rgb>>();
+    if (!is_shared(leader)) return make();
+    auto& shared = gains_[{&points.cloud(), bodies_[leader]->plain_kernel.get()}];
+    if (!shared) shared = make();
+    return shared;
 }
 
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
@@ -107,45 +159,46 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const LitPoints& lit) {
-    if (lit.cells || lit.moments.empty()) return lit.cells;
-    const Object& placed = scene.objects[object];
-    return std::make_shared<const Cells>(
-        cells_of(lit.points, transformed(scene.meshes[placed.mesh], placed.local_to_world), 1));
-}
-
 void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats) {
+                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                 const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
+    // A bake from elsewhere has no cells: make those that its light was a mean over.
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i] || lit[i].moments.empty()) continue;
+        PointCloud& cloud = lit[i].points.cloud();
+        cloud.add_cells(
+            false, [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
+        cloud.drop_places();
+    }
     const TranslucencySets sets(scene, ray_scene, bodies, lit);
     stats.warnings.insert(stats.warnings.end(), sets.warnings().begin(), sets.warnings().end());
+    ThicknessTrees thickness(scene, ray_scene, bodies, sets);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0) continue;
-        bodies[i]->spacing = static_cast<float>(lit[i].points.spacing);
-        const Body& body = *bodies[i];
+        Body& body = *bodies[i];
+        body.spacing = static_cast<float>(lit[i].points.spacing());
+        const std::size_t leader = sets.leader(i);
+        body.to_points = sets.points(leader).to_cloud();
         if (!sets.is_leader(i)) {
-            bodies[i]->tree = bodies[sets.leader(i)]->tree;
-            bodies[i]->thickness = bodies[sets.leader(i)]->thickness;
-            bodies[i]->at_points = bodies[sets.leader(i)]->at_points;
+            body.tree = bodies[leader]->tree;
+            body.thickness = bodies[leader]->thickness;
+            body.at_points = bodies[leader]->at_points;
             continue;
         }
-        const PointSet& points = sets.points(i);
-        const std::shared_ptr<const Cells> cells =
-            sets.cells(i, [&](std::size_t k) { return cells_of_body(scene, k, lit[k]); });
-        std::vector<V3f> moments;
-        if (cells && trees_take_moments(groups)) {
-            moments = sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return lit[k].moments; });
-        }
-        bodies[i]->tree = std::make_shared<const PointTree>(
-            points, sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return lit[k].irradiance; }),
-            groups, body.profile, body.material->ramp, cells.get(), moments);
+        const bool is_alone = !sets.shells(i);
+        body.tree =
+            is_alone ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
+                     : make_tree(sets.points(i), body.kernel,
+                                 sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
+                                 sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
+        if (is_alone) has_taken(i);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
-            bodies[i]->thickness = make_thickness_tree(body, points, ray_scene, sets.shells(i));
+            body.thickness = thickness.of(i);
         }
-        bodies[i]->at_points = PointGathers::make(body, points, plan);
-        stats.points += bodies[i]->tree->point_count();
-        stats.nodes += bodies[i]->tree->node_count();
+        body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), plan);
+        stats.points += body.tree->point_count();
+        stats.nodes += body.tree->node_count();
     }
 }
 

@@ -5,6 +5,8 @@
 // Not: light that diffuses from one body into another that it touches.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "frazil/lighting/irradiance.h"
 #include "frazil/material/microfacet.h"
 #include "frazil/render/options.h"
+#include "frazil/render/placed_points.h"
 #include "frazil/render/point_gathers.h"
 #include "frazil/render/scene.h"
 #include "frazil/render/shells.h"
@@ -22,13 +25,26 @@
 namespace frazil {
 
 struct Body {
+    Body(const IceMaterial* of_material, std::shared_ptr<const DielectricAlbedo> with_boundary,
+         const Profile& with_profile, std::shared_ptr<const TreeKernel> sum,
+         std::shared_ptr<const TreeKernel> plain_sum)
+        : material(of_material),
+          boundary(std::move(with_boundary)),
+          profile(with_profile),
+          kernel(std::move(sum)),
+          plain_kernel(std::move(plain_sum)),
+          total_reflectance(albedo(with_profile)) {}
+
     const IceMaterial* material = nullptr;
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
-    Rgb total_reflectance = Rgb(0.0f);              // Rd_total
+    std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
+    Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
+    // Trees stand where their points do: places are brought there by `to_points`, and `to_own_points` for the overlays'.
+    M44f to_points, to_own_points;
     std::shared_ptr<const PointTree> tree;          // none where the object has no surface; one for a translucency set
-    std::shared_ptr<const PointTree> thickness;     // make_thickness_tree
-    std::unique_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
+    std::shared_ptr<const PointTree> thickness;     // ThicknessTrees
+    std::shared_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
@@ -50,24 +66,49 @@ struct Body {
 
 // A body's points and the light that enters them.
 struct LitPoints {
-    PointSet points;
+    PlacedPoints points;
     std::vector<Rgb> irradiance;    // (N, groups)
     std::vector<V3f> moments = {};  // (N, groups), as in Irradiance; empty where light was baked at the points alone
-    std::shared_ptr<const Cells> cells = nullptr;  // of the points; made anew where they are wanted and not here
 };
 
-// The cells that an object's tree is made with; null where its light was baked at the points alone.
-std::shared_ptr<const Cells> cells_of_body(const Scene& scene, std::size_t object, const LitPoints& lit);
-// Whether trees are given the moments of light: they keep one centre of light a cell for all groups together, which would
-// move when one group's light is changed after the render.
-inline bool trees_take_moments(std::size_t groups) {
-    return groups == 1;
-}
+// The mesh of an object where its points' cloud is.
+Mesh mesh_at_cloud(const Scene& scene, std::size_t object, const PlacedPoints& points);
+// A tree of light on points that stand somewhere; `moments` in the world.
+std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shared_ptr<const TreeKernel> kernel,
+                                           const std::vector<Rgb>& irradiance, std::size_t groups,
+                                           std::vector<V3f> moments = {});
 
-// A tree that sums the gain of thin parts (thickness.h) over a body's points; none where it has no points.
-std::unique_ptr<const PointTree> make_thickness_tree(const Body& body, const PointSet& points,
-                                                     const RayScene& ray_scene, const Shells* shells = nullptr);
-// The mean gain around each position, from such a tree; empty without one.
+class TranslucencySets;
+
+// Trees that sum the gain of thin parts (thickness.h) over the points of bodies. A closed body's chords end at its own other
+// side, so that bodies that share their points share this too; an open one's at whatever is there.
+class ThicknessTrees {
+  public:
+    // All must outlive this.
+    ThicknessTrees(const Scene& scene, const RayScene& ray_scene, const std::vector<std::unique_ptr<Body>>& bodies,
+                   const TranslucencySets& sets)
+        : scene_(scene), ray_scene_(ray_scene), bodies_(bodies), sets_(sets) {}
+
+    // Of a leader of translucency sets; null where it has no points.
+    std::shared_ptr<const PointTree> of(std::size_t leader);
+    // The mean gain around each of its points, from such a tree.
+    std::shared_ptr<const std::vector<Rgb>> gains_at_points(std::size_t leader, const GatherOptions& options);
+
+  private:
+    bool is_shared(std::size_t leader);
+
+    const Scene& scene_;
+    const RayScene& ray_scene_;
+    const std::vector<std::unique_ptr<Body>>& bodies_;
+    const TranslucencySets& sets_;
+    std::map<std::uint32_t, bool> is_closed_;  // by mesh
+    // By what they depend on: points, and a kernel that a material has for itself.
+    using Key = std::pair<const PointCloud*, const TreeKernel*>;
+    std::map<Key, std::shared_ptr<const PointTree>> trees_;
+    std::map<Key, std::shared_ptr<const std::vector<Rgb>>> gains_;
+};
+
+// The mean gain around each position (where the tree stands), from such a tree; empty without one.
 std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options);
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
@@ -81,10 +122,11 @@ std::vector<Passage> passages_of(const Scene& scene);
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
-// use for it or a layer `wants_depth`; and the gathers at its points, where the plan wants them. Fills points, nodes and
-// seconds of the stats.
-void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
-                 RenderStats& stats);
+// use for it or a layer `wants_depth`; and the gathers at its points, where the plan wants them. `has_taken(i)` is called
+// when the light of an object is needed no more. Fills points, nodes and seconds of the stats.
+void plant_trees(
+    const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
+    bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+    const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});
 
 }  // namespace frazil

@@ -25,35 +25,47 @@ struct Sightline {
     std::uint32_t body;      // whose point is seen: a leader of translucency sets
     std::uint32_t sender;    // index into the points of its set
     Rgb weight;              // irradiance per exitance
-    V3f offset;              // as in BounceHit
+    float mirrored;          // irradiance per irradiance that enters there: what the surface reflects
 };
 
 // All that an object's points see, batch after batch of points.
 using Sightlines = std::vector<std::vector<Sightline>>;
 
-// What a body sends out, point by point, (N, groups): the light of the last bounce alone, compensated.
-std::vector<Rgb> exitance_of(const Body& body, const PointSet& points, const Cells* cells, const Irradiance& last,
-                             const std::vector<Rgb>& gains, const GatherOptions& options) {
-    const std::vector<Rgb>& irradiance = last.values;
+// Light of the last bounce alone, (N, groups) per point: what enters a body, and its exitance, compensated.
+struct Exchange {
+    std::vector<Rgb> entering, exitance;
+};
+
+Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<Rgb> irradiance, std::size_t groups,
+                     const std::vector<Rgb>& gains, const GatherOptions& options) {
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
-    const PointTree tree(points, irradiance, last.groups, body.profile, {}, cells, last.moments);
+    const auto tree = make_tree(points, body.plain_kernel, irradiance, groups);
+    const std::vector<V3f>& positions = points.cloud().points().positions;
     // Bounces average over many points, and compensation keeps their energy: the plain sum will do.
-    Gathered gathered = tree.gather(points.positions.data(), points.size(), {options.tolerance, Estimator::sum, false});
+    Gathered gathered = tree->gather(positions.data(), positions.size(), {options.tolerance, Estimator::sum, false});
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;
-    return std::move(gathered.exitance);
+    return {std::move(irradiance), std::move(gathered.exitance)};
+}
+
+// What a boundary reflects towards wo per unit of irradiance that enters, where light comes evenly from all around: with what
+// leaves the core it makes a white furnace of radiance one. Other light is reflected as if it were spread so.
+float mirrored_radiance(const Body& body, const Surface& surface, const V3f& wo) {
+    const float roughness = surface.covering.roughness;
+    return (1.0f - body.transmittance(surface.normal.dot(wo), roughness)) * kInvPi /
+           body.transmittance_average(roughness);
 }
 
 // Finds the points of ice that rays meet.
 class IceFinder {
   public:
     IceFinder(const std::vector<std::unique_ptr<Body>>& bodies, const TranslucencySets& sets,
-              const SurfaceResolver& resolver, std::span<const LitPoints> lit)
-        : bodies_(bodies), sets_(sets), resolver_(resolver), lookups_(lit.size()) {
-        for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (lit[i].points.size() > 0 && sets.is_leader(i)) {
-                lookups_[i] = std::make_unique<const PointLookup>(sets.points(i));
+              const SurfaceResolver& resolver)
+        : bodies_(bodies), sets_(sets), resolver_(resolver), lookups_(bodies.size()) {
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            if (bodies[i] && sets.is_leader(i) && sets.points(i).size() > 0) {
+                lookups_[i] = sets.points(i).cloud().lookup();
             }
         }
     }
@@ -63,11 +75,15 @@ class IceFinder {
         for (const BounceHit& hit : hits) {
             const std::size_t leader = sets_.leader(hit.surface.placement);
             if (!lookups_[leader]) continue;
-            const std::uint32_t point = lookups_[leader]->nearest(hit.position, hit.surface.geometric_normal);
+            const PlacedPoints& points = sets_.points(leader);
+            const std::uint32_t point = lookups_[leader]->nearest(hit.position * points.to_cloud(),
+                                                                  points.into_cloud(hit.surface.geometric_normal));
             if (point == PointLookup::kNone) continue;
             const Surface surface = resolver_.resolve(hit.surface, hit.direction);
-            const Rgb scale = bodies_[hit.surface.placement]->radiance_per_exitance(surface, -hit.direction);
-            found.push_back({hit.point, static_cast<std::uint32_t>(leader), point, scale * hit.weight, hit.offset});
+            const Body& body = *bodies_[hit.surface.placement];
+            found.push_back({hit.point, static_cast<std::uint32_t>(leader), point,
+                             body.radiance_per_exitance(surface, -hit.direction) * hit.weight,
+                             mirrored_radiance(body, surface, -hit.direction) * hit.weight});
         }
         found.shrink_to_fit();
         return found;
@@ -77,20 +93,19 @@ class IceFinder {
     const std::vector<std::unique_ptr<Body>>& bodies_;
     const TranslucencySets& sets_;
     const SurfaceResolver& resolver_;
-    std::vector<std::unique_ptr<const PointLookup>> lookups_;  // by leader
+    std::vector<std::shared_ptr<const PointLookup>> lookups_;  // by leader
 };
 
-// Light along all sightlines of an object: what the exitance of the points that are seen brings.
-void add_light(const Sightlines& sightlines, const std::vector<std::vector<Rgb>>& exitance, Irradiance& light) {
+// Light along all sightlines of an object: what the points that are seen send.
+void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, Irradiance& light) {
     parallel_for(sightlines.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t batch = begin; batch < end; ++batch) {
             for (const Sightline& line : sightlines[batch]) {
-                const Rgb* sent = &exitance[line.body][line.sender * light.groups];
+                const Exchange& body = bodies[line.body];
+                const std::size_t from = line.sender * light.groups, to = line.receiver * light.groups;
                 for (std::size_t g = 0; g < light.groups; ++g) {
-                    const Rgb value = sent[g] * line.weight;
-                    light.values[line.receiver * light.groups + g] += value;
-                    if (light.moments.empty()) continue;
-                    light.moments[line.receiver * light.groups + g] += line.offset * (value.x + value.y + value.z);
+                    light.values[to + g] +=
+                        body.exitance[from + g] * line.weight + body.entering[from + g] * line.mirrored;
                 }
             }
         }
@@ -130,40 +145,36 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         kShadowRaysPerReflection, options.seed);
 
     const TranslucencySets sets(scene, ray_scene, bodies, lit);
-    std::vector<Irradiance> last(lit.size());                     // what the last bounce brought, by object
-    std::vector<std::vector<Rgb>> gains(lit.size());              // of thin parts, by set
-    std::vector<std::shared_ptr<const Cells>> cells(lit.size());  // by set
+    ThicknessTrees thickness(scene, ray_scene, bodies, sets);
+    std::vector<std::shared_ptr<const std::vector<Rgb>>> gains(lit.size());  // of thin parts, by set
     std::size_t points = 0;
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        last[i].groups = groups;
-        last[i].values = lit[i].irradiance;
-        last[i].moments = lit[i].moments;
         points += lit[i].points.size();
-        if (!bodies[i] || !sets.is_leader(i)) continue;
-        cells[i] = sets.cells(i, [&](std::size_t k) { return lit[k].cells; });
-        const auto thickness = make_thickness_tree(*bodies[i], sets.points(i), ray_scene, sets.shells(i));
-        gains[i] =
-            thickness_gains(thickness.get(), sets.points(i).positions.data(), sets.points(i).size(), options.gather);
+        if (bodies[i] && sets.is_leader(i)) gains[i] = thickness.gains_at_points(i, options.gather);
     }
     if (points == 0) return;
 
     // What each point sees: ice, along lines that all bounces take, and what straight light makes of other surfaces.
     const std::size_t wanted = static_cast<std::size_t>(std::max(1, options.bake_samples / 4));
     const int rays = static_cast<int>(std::clamp<std::size_t>(kMostSightlines / points, 1, wanted));
-    const IceFinder ice(bodies, sets, resolver, lit);
+    const IceFinder ice(bodies, sets, resolver);
     std::vector<Sightlines> sightlines(lit.size());
-    std::vector<Irradiance> reflected_once(lit.size());
+    std::vector<Irradiance> last(lit.size());  // what the last bounce brought; at first what surfaces reflect
+    std::vector<std::vector<float>> entering(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        if (last[i].values.empty()) continue;
+        if (lit[i].points.size() == 0) continue;
+        const PointSet in_world = lit[i].points.in_world();
+        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world);
         IrradianceOptions bake_options{rays, options.seed};
         Mesh mesh;
-        if (lit[i].cells) {
+        const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
+        if (cells) {
             mesh = transformed(scene.meshes[scene.objects[i].mesh], scene.objects[i].local_to_world);
-            bake_options.cells = {lit[i].cells.get(), &mesh};
+            bake_options.cells = {cells.get(), &mesh};
         }
         sightlines[i].resize((lit[i].points.size() + kPointsPerBounceBatch - 1) / kPointsPerBounceBatch);
-        reflected_once[i] = bake_bounce(
-            lit[i].points, ray_scene, groups,
+        last[i] = bake_bounce(
+            in_world, ray_scene, groups,
             [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                 if (hits.empty()) return;
                 sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
@@ -171,40 +182,28 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             },
             [&](float cosine) { return bodies[i]->transmittance(cosine, bodies[i]->material->roughness.value); },
             bake_options, progress);
-        stats.bake_rays += reflected_once[i].rays;
-        stats.dropped_samples += reflected_once[i].dropped_samples;
+        // Bounced light is even over a cell, as far as so few rays can tell.
+        last[i].moments = {};
+        last[i].errors = {};
+        stats.bake_rays += last[i].rays;
+        stats.dropped_samples += last[i].dropped_samples;
     }
 
-    std::vector<std::vector<float>> entering(lit.size());
-    for (std::size_t i = 0; i < lit.size(); ++i) {
-        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), lit[i].points);
-    }
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
-        std::vector<std::vector<Rgb>> exitance(lit.size());
+        std::vector<Exchange> exchange(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
-            if (last[i].values.empty() || !sets.is_leader(i)) continue;
-            Irradiance light;
-            light.groups = groups;
-            light.values =
-                sets.united(i, groups, [&](std::size_t k) -> const std::vector<Rgb>& { return last[k].values; });
-            if (cells[i] && trees_take_moments(groups)) {
-                light.moments =
-                    sets.united(i, groups, [&](std::size_t k) -> const std::vector<V3f>& { return last[k].moments; });
-            }
-            exitance[i] = exitance_of(*bodies[i], sets.points(i), cells[i].get(), light, gains[i], options.gather);
+            if (!gains[i] || lit[i].points.size() == 0) continue;
+            // At first the light that is there, then what the last bounce brought.
+            const auto values = [&](std::size_t k) { return bounce == 0 ? &lit[k].irradiance : &last[k].values; };
+            exchange[i] = exchange_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values), groups,
+                                      *gains[i], options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;
-            if (bounce == 0) {
-                last[i] = std::move(reflected_once[i]);
-            } else {
-                std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
-                std::fill(last[i].moments.begin(), last[i].moments.end(), V3f(0.0f));
-            }
-            add_light(sightlines[i], exitance, last[i]);
+            if (bounce > 0) std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
+            add_light(sightlines[i], exchange, last[i]);
             keep_entering(entering[i], last[i]);
             for (std::size_t k = 0; k < last[i].values.size(); ++k) lit[i].irradiance[k] += last[i].values[k];
-            for (std::size_t k = 0; k < last[i].moments.size(); ++k) lit[i].moments[k] += last[i].moments[k];
         }
         if (progress) progress->update("bounce", 1.0);  // rays took the time; asks whether to go on
     }

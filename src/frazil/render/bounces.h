@@ -1,10 +1,11 @@
 // Light that reaches the points of ice by way of other surfaces: ice lights ice, and diffuse surfaces light ice.
 // Model: every point looks around once and keeps which points of ice it sees. Each bounce is one gather at the points
 //   themselves, a plain sum (noise-free ones change pictures by a thousandth), compensated so that energy is kept, and one
-//   pass along the lines of sight. Opaque surfaces reflect, diffusely, what comes straight from lights.
+//   pass along the lines of sight. Ice sends the exitance of the point that is seen, and reflects light as if it came there
+//   evenly from all around. Opaque surfaces reflect, diffusely, what comes straight from lights.
 // Units: W/m².
 // Valid: the same bits for any number of threads.
-// Not: light that ice throws on opaque surfaces and these throw back; glossy paths.
+// Not: light that ice throws on opaque surfaces and these throw back; mirror images in ice.
 #pragma once
 
 #include "frazil/render/bodies.h"

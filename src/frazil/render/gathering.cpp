@@ -22,6 +22,11 @@ struct Answers {
     std::vector<std::uint32_t> row_of;
 };
 
+std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
+    for (V3f& position : positions) position = position * matrix;
+    return positions;
+}
+
 // Each place that requests without a row ask for once.
 std::vector<V3f> shared_places(std::span<const GatherRequest> requests, float cell,
                                std::vector<std::uint32_t>& row_of) {
@@ -67,15 +72,18 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
         if (request.is_primary || request.normal == V3f(0.0f)) continue;
-        if (!body.at_points->append(request.position, request.normal, blended, blended_thin)) continue;
+        V3f normal;
+        body.to_points.multDirMatrix(request.normal, normal);
+        if (!body.at_points->append(request.position * body.to_points, normal, blended, blended_thin)) continue;
         answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
         is_blended.push_back(i);
     }
     const Medium& medium = body.material->medium;
     const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
-    answers.gathered = body.tree->gather(places.data(), places.size(), options);
-    answers.thin = thickness_gains(body.thickness.get(), places.data(), places.size(), options);
+    const std::vector<V3f> at_tree = moved(places, body.to_points);
+    answers.gathered = body.tree->gather(at_tree.data(), at_tree.size(), options);
+    answers.thin = thickness_gains(body.thickness.get(), at_tree.data(), at_tree.size(), options);
     append(answers.gathered.exitance, blended.exitance);
     append(answers.gathered.coverage, blended.coverage);
     append(answers.gathered.layers, blended.layers);
@@ -101,7 +109,10 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
             answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers, places);
         tile.gathers += places.size();
         Gathered by_overlay;
-        if (body.overlay_tree) by_overlay = body.overlay_tree->gather(places.data(), places.size(), options);
+        if (body.overlay_tree) {
+            const std::vector<V3f> own = moved(places, body.to_own_points);
+            by_overlay = body.overlay_tree->gather(own.data(), own.size(), options);
+        }
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];

@@ -23,8 +23,8 @@ Openness::Openness(const std::vector<LitPoints>& lit, const RayScene& scene, int
     options.samples = samples;
     options.seed = seed;
     for (std::size_t i = 0; i < lit.size(); ++i) {
-        const PointSet& points = lit[i].points;
-        if (points.size() == 0) continue;
+        if (lit[i].points.size() == 0) continue;
+        const PointSet points = lit[i].points.in_world();
         const Occlusion baked = bake_occlusion(points, scene, options);
         std::vector<Rgb> values;
         values.reserve(2 * points.size());

@@ -42,7 +42,8 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() == 0 || bodies[i]->material->overlays.empty()) continue;
         const std::size_t overlays = bodies[i]->material->overlays.size(), count = lit[i].points.size();
-        const std::vector<float> taken = resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points);
+        const std::vector<float> taken =
+            resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points.in_world());
         // As much of the light, and of its moments, as each overlay takes.
         const auto taken_of = [&](const auto& values) {
             std::remove_cvref_t<decltype(values)> result(values.size() * overlays);
@@ -55,11 +56,9 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
             }
             return result;
         };
-        const std::shared_ptr<const Cells> cells = cells_of_body(scene, i, lit[i]);
-        bodies[i]->overlay_tree = std::make_unique<const PointTree>(
-            lit[i].points, taken_of(lit[i].irradiance), overlays * groups, bodies[i]->profile,
-            bodies[i]->material->ramp, cells.get(),
-            cells && trees_take_moments(groups) ? taken_of(lit[i].moments) : std::vector<V3f>());
+        bodies[i]->to_own_points = lit[i].points.to_cloud();
+        bodies[i]->overlay_tree = make_tree(lit[i].points, bodies[i]->kernel, taken_of(lit[i].irradiance),
+                                            overlays * groups, taken_of(lit[i].moments));
     }
 }
 

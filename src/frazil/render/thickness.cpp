@@ -14,7 +14,7 @@ constexpr std::uint32_t kSeed = 0x74686963U;
 
 // The mean length of cosine-distributed chords from a point inwards; infinite where one finds no other side.
 float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u, const RayScene& scene,
-                 const Shells* shells) {
+                 const Shells* shells, PlacementMask mask) {
     const V3f inward = -normal, origin = offset_origin(position, inward);
     const auto [s, t] = tangent_frame(inward);
     float sum = 0.0f;
@@ -24,7 +24,7 @@ float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u,
         Hit hit;
         if (shells) {
             sum += shells->way_through({origin, direction});
-        } else if (scene.intersect({origin, direction}, hit)) {
+        } else if (scene.intersect({origin, direction}, hit, mask)) {
             sum += hit.t;
         } else {
             return std::numeric_limits<float>::infinity();
@@ -36,7 +36,7 @@ float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u,
 }  // namespace
 
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once, const Shells* shells) {
+                                const Rgb& traced_once, const Shells* shells, PlacementMask mask) {
     Rgb returned(1.0f);  // A
     for (int c = 0; c < 3; ++c) {
         const double scatter = medium.sigma_s_prime[c];
@@ -49,7 +49,7 @@ std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, c
         std::vector<V2f> u(net.size());
         for (std::size_t k = begin; k < end; ++k) {
             net.draw(kSeed, static_cast<std::uint32_t>(k), u);
-            const float length = stretch * mean_chord(points.positions[k], points.normals[k], u, scene, shells);
+            const float length = stretch * mean_chord(points.positions[k], points.normals[k], u, scene, shells, mask);
             if (!std::isfinite(length)) continue;
             for (int c = 0; c < 3; ++c) {
                 const float most = 1.0f - returned[c], plane = returned[c] - traced_once[c];

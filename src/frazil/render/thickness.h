@@ -18,8 +18,8 @@
 namespace frazil {
 
 // (1 - a)/A per point, both less `traced_once`, what rays trace of the light of one scattering (over irradiance). `shells`
-// that are one body: chords end where the last of them is left.
+// that are one body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once, const Shells* shells = nullptr);
+                                const Rgb& traced_once, const Shells* shells = nullptr, PlacementMask mask = nullptr);
 
 }  // namespace frazil

@@ -58,8 +58,11 @@ TranslucencySets::TranslucencySets(const Scene& scene, const RayScene& ray_scene
 }
 
 void TranslucencySets::unite(Union& set) const {
+    PointSet points;
+    Cells cells;
+    bool has_cells = true;
     for (const std::size_t object : set.members) {
-        const PointSet& own = lit_[object].points;
+        const PointSet own = lit_[object].points.in_world();
         std::vector<char> is_inner(own.size(), 0);
         parallel_for(own.size(), 256, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) {
@@ -68,15 +71,23 @@ void TranslucencySets::unite(Union& set) const {
                               set.shells.contains(own.positions[k] - skin, object, object);
             }
         });
-        set.points.spacing = std::max(set.points.spacing, own.spacing);
+        has_cells = has_cells && lit_[object].points.cloud().cells() != nullptr;
+        const Cells own_cells = has_cells ? lit_[object].points.cells_in_world() : Cells{};
+        points.spacing = std::max(points.spacing, own.spacing);
         for (std::size_t k = 0; k < own.size(); ++k) {
             if (is_inner[k]) continue;
-            set.points.positions.push_back(own.positions[k]);
-            set.points.normals.push_back(own.normals[k]);
-            set.points.areas.push_back(own.areas[k]);
+            points.positions.push_back(own.positions[k]);
+            points.normals.push_back(own.normals[k]);
+            points.areas.push_back(own.areas[k]);
             set.sources.emplace_back(object, k);
+            if (!has_cells) continue;
+            cells.areas.push_back(own_cells.areas[k]);
+            cells.centroids.push_back(own_cells.centroids[k]);
+            cells.covariances.push_back(own_cells.covariances[k]);
         }
     }
+    set.points = PlacedPoints(std::move(points));
+    if (has_cells) set.points.cloud().add_cells(false, [&](const PointSet&) { return std::move(cells); });
 }
 
 const TranslucencySets::Union* TranslucencySets::find(std::size_t leader) const {
@@ -86,39 +97,9 @@ const TranslucencySets::Union* TranslucencySets::find(std::size_t leader) const 
     return nullptr;
 }
 
-const PointSet& TranslucencySets::points(std::size_t leader) const {
+const PlacedPoints& TranslucencySets::points(std::size_t leader) const {
     const Union* set = find(leader);
     return set ? set->points : lit_[leader].points;
-}
-
-std::vector<Rgb> TranslucencySets::united(std::size_t leader, std::size_t columns, const OfObject& values) const {
-    const Union* set = find(leader);
-    if (!set) return values(leader);
-    std::vector<Rgb> result;
-    result.reserve(set->sources.size() * columns);
-    for (const auto& [object, point] : set->sources) {
-        const std::vector<Rgb>& own = values(object);
-        for (std::size_t c = 0; c < columns; ++c) result.push_back(own[point * columns + c]);
-    }
-    return result;
-}
-
-std::shared_ptr<const Cells> TranslucencySets::cells(std::size_t leader, const CellsOfObject& cells) const {
-    const Union* set = find(leader);
-    if (!set) return cells(leader);
-    std::map<std::size_t, std::shared_ptr<const Cells>> known;
-    for (const std::size_t object : set->members) {
-        known[object] = cells(object);
-        if (!known[object]) return nullptr;
-    }
-    auto result = std::make_shared<Cells>();
-    for (const auto& [object, point] : set->sources) {
-        const Cells& own = *known[object];
-        result->areas.push_back(own.areas[point]);
-        result->centroids.push_back(own.centroids[point]);
-        result->covariances.push_back(own.covariances[point]);
-    }
-    return result;
 }
 
 const Shells* TranslucencySets::shells(std::size_t leader) const {

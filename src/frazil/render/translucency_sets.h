@@ -7,7 +7,6 @@
 // Not: the seam: points beside it stand for a little area that lies inside.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,14 +28,25 @@ class TranslucencySets {
     std::size_t leader(std::size_t object) const { return leader_[object]; }
     bool is_leader(std::size_t object) const { return leader_[object] == object; }
 
-    // The points of a leader's set that lie on the union's surface.
-    const PointSet& points(std::size_t leader) const;
-    // Their values, (N, columns), from those of each member's own points.
-    using OfObject = std::function<const std::vector<Rgb>&(std::size_t object)>;
-    std::vector<Rgb> united(std::size_t leader, std::size_t columns, const OfObject& values) const;
-    // The cells of points(leader), from those of each member's own points; null where a member has none.
-    using CellsOfObject = std::function<std::shared_ptr<const Cells>(std::size_t object)>;
-    std::shared_ptr<const Cells> cells(std::size_t leader, const CellsOfObject& cells) const;
+    // The points of a leader's set that lie on the union's surface; with cells where all members have some.
+    const PlacedPoints& points(std::size_t leader) const;
+    // Their values, (N, columns), from those of each member's own points; empty where a member has none.
+    // `values(object)` points to these.
+    template <class Value, class OfObject>
+    std::vector<Value> united(std::size_t leader, std::size_t columns, const OfObject& values) const {
+        const Union* set = find(leader);
+        if (!set) return *values(leader);
+        for (const std::size_t member : set->members) {
+            if (values(member)->empty()) return {};
+        }
+        std::vector<Value> result;
+        result.reserve(set->sources.size() * columns);
+        for (const auto& [object, point] : set->sources) {
+            const std::vector<Value>& own = *values(object);
+            for (std::size_t c = 0; c < columns; ++c) result.push_back(own[point * columns + c]);
+        }
+        return result;
+    }
     // Null for a body by itself.
     const Shells* shells(std::size_t leader) const;
 
@@ -45,7 +55,7 @@ class TranslucencySets {
         std::size_t leader = 0;
         std::vector<std::size_t> members;
         Shells shells;
-        PointSet points;
+        PlacedPoints points;
         std::vector<std::pair<std::size_t, std::size_t>> sources;  // object and its point
     };
     const Union* find(std::size_t leader) const;

@@ -33,23 +33,22 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
         for (std::size_t s = 0; s < list.sources.size(); ++s) {
             const Source& source = list.sources[s];
             const auto& cov = source.covariance;
-            const auto& off = source.power_offset;
             const float dx = source.center[0] - block.x[lane], dy = source.center[1] - block.y[lane],
                         dz = source.center[2] - block.z[lane];
             const float q = dx * dx + dy * dy + dz * dz;
             const float trace = source.trace;
             const float along =
                 dx * (cov[0] * dx + cov[3] * dy + cov[4] * dz) + dy * (cov[1] * dy + cov[5] * dz) + dz * cov[2] * dz;
-            const float lean = dx * off[0] + dy * off[1] + dz * off[2];
             // Mean and variance of the distance over the source.
             const float variance = std::max(0.0f, along / (q + trace + 1e-30f));
-            const float mean_r = std::sqrt(std::max(0.0f, q + trace + lean - variance));
+            const float mean_r = std::sqrt(std::max(0.0f, q + trace - variance));
             const float half_width = std::sqrt(3.0f * variance) + 1e-6f * mean_r + 1e-30f;
             for (int c = 0; c < 3; ++c) {
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;
-                float lit = even + f.slope * lean;
-                unshaded[c] += double(lit) * source.power[c];
+                unshaded[c] += double(even) * source.power[c];
+                // The kernel with its ramp, and its derivative in q.
+                float lit = even, lit_slope = f.slope;
                 if (!ramp.is_flat) {
                     // Average each hinge over a uniform spread of distances.
                     float color = ramp.first[c], slope = 0.0f;
@@ -59,11 +58,14 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                         color += hinge.slope_change[c] * (part * part * half_width + std::max(0.0f, x - half_width));
                         slope += hinge.slope_change[c] * part;
                     }
-                    lit = lit * color + 2.0f * std::sqrt(q) * f.slope * variance * slope;
+                    lit = even * color + 2.0f * std::sqrt(q) * f.slope * variance * slope;
+                    lit_slope = f.slope * color + f.value * slope * 0.5f / (mean_r + half_width);
                 }
                 coverage[c] += double(even) * source.area;
                 for (std::size_t g = 0; g < groups; ++g) {
-                    exitance[3 * g + c] += double(lit) * list.powers[s * row + 3 * g + c];
+                    const GroupPower& lamp = list.powers[s * groups + g];
+                    const float lean = dx * lamp.offset[0] + dy * lamp.offset[1] + dz * lamp.offset[2];
+                    exitance[3 * g + c] += double(lit + lit_slope * lean) * lamp.power[c];
                 }
             }
         }

@@ -1,6 +1,7 @@
 // The inner loop of a gather: a list of sources against a block of shading points.
 // Model: each source is a patch of surface of known centroid and second moments C; its kernel is the profile averaged
-//   over the patch to second order, f + f' tr C + 2 f'' d.C d, with f' and f'' the derivatives in q = |d|².
+//   over the patch to second order, f + f' tr C + 2 f'' d.C d, with f' and f'' the derivatives in q = |d|²; light of a
+//   group whose power is centred elsewhere adds 2 f' d.offset.
 // Units: metres.
 // Valid: sums run over the sources in order, one shading point a lane: the same bits however blocks are spread.
 // Not: which sources are in the list: gather.cpp.
@@ -20,17 +21,22 @@ inline constexpr std::size_t kBlockLanes = 64;  // shading points of a block, at
 
 struct Source {
     std::array<float, 3> center;
-    std::array<float, 6> covariance;    // xx, yy, zz, and twice xy, xz, yz
-    float trace;                        // of the covariance
-    std::array<float, 3> power_offset;  // twice the way from center to the centre of power
+    std::array<float, 6> covariance;  // xx, yy, zz, and twice xy, xz, yz
+    float trace;                      // of the covariance
     float area;
     std::array<float, 3> power;  // of all groups together, in magnitude
 };
 
-// Sources of one block with their power, (sources, 3 groups).
+// One light group's power of a source.
+struct GroupPower {
+    std::array<float, 3> power;
+    std::array<float, 3> offset;  // twice the way from the source's center to the centre of this power
+};
+
+// Sources of one block with their powers, (sources, groups).
 struct SourceList {
     std::vector<Source> sources;
-    std::vector<float> powers;
+    std::vector<GroupPower> powers;
 
     void clear() {
         sources.clear();
@@ -43,7 +49,7 @@ struct BlockSums {
     alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
     std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
     alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
-    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // exitance of all groups, without ramp
+    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // by the power of all groups, without ramp
     std::vector<float> exitance;
 
     void clear(std::size_t groups) {

@@ -43,13 +43,48 @@ HWY_INLINE void shade(const RampHinges& ramp, int channel, FloatV mean_r, FloatV
     }
 }
 
+// What the sources of a tile do to each lane: the kernel of each channel, its derivative in squared distance, and the way
+// from the shading point to the source.
+struct TileShares {
+    float kernel[3][kTile * kBlockLanes], slope[3][kTile * kBlockLanes], way[3][kTile * kBlockLanes];
+};
+
+// Add the light of kGroups groups, one after the other in `powers`, whose rows hold `groups`.
+template <int kGroups>
+HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources, const GroupPower* HWY_RESTRICT powers,
+                           std::size_t groups, float* HWY_RESTRICT lit) {
+    const Float d;
+    const std::size_t lanes = hn::Lanes(d);
+    FloatV sum[3 * kGroups];
+    for (FloatV& s : sum) s = hn::Zero(d);
+    for (std::size_t i = 0; i < sources; ++i) {
+        const FloatV x = hn::Load(d, shares.way[0] + i * lanes), y = hn::Load(d, shares.way[1] + i * lanes),
+                     z = hn::Load(d, shares.way[2] + i * lanes);
+        const FloatV k0 = hn::Load(d, shares.kernel[0] + i * lanes), k1 = hn::Load(d, shares.kernel[1] + i * lanes),
+                     k2 = hn::Load(d, shares.kernel[2] + i * lanes);
+        const FloatV s0 = hn::Load(d, shares.slope[0] + i * lanes), s1 = hn::Load(d, shares.slope[1] + i * lanes),
+                     s2 = hn::Load(d, shares.slope[2] + i * lanes);
+        for (int g = 0; g < kGroups; ++g) {
+            const auto& [p, o] = powers[i * groups + g];
+            const FloatV lean =
+                hn::MulAdd(z, hn::Set(d, o[2]), hn::MulAdd(y, hn::Set(d, o[1]), hn::Mul(x, hn::Set(d, o[0]))));
+            sum[3 * g] = hn::MulAdd(hn::MulAdd(s0, lean, k0), hn::Set(d, p[0]), sum[3 * g]);
+            sum[3 * g + 1] = hn::MulAdd(hn::MulAdd(s1, lean, k1), hn::Set(d, p[1]), sum[3 * g + 1]);
+            sum[3 * g + 2] = hn::MulAdd(hn::MulAdd(s2, lean, k2), hn::Set(d, p[2]), sum[3 * g + 2]);
+        }
+    }
+    for (int row = 0; row < 3 * kGroups; ++row, lit += kBlockLanes) {
+        hn::StoreU(hn::Add(hn::LoadU(d, lit), sum[row]), d, lit);
+    }
+}
+
 template <bool kHasRamp>
 void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const SourceList& list, std::size_t groups,
                       BlockSums& block) {
     const Float d;
     const Int di;
-    const std::size_t lanes = hn::Lanes(d), row = 3 * groups, count = list.sources.size();
-    HWY_ALIGN float kernel[3][kTile * kBlockLanes];
+    const std::size_t lanes = hn::Lanes(d), count = list.sources.size();
+    HWY_ALIGN TileShares shares;
 
     const IntV one_bits = hn::Set(di, 0x3f800000), exponent_bits = hn::Set(di, 0x7f800000);
     const IntV below_bits = hn::Set(di, (1 << (23 - table.split)) - 1);
@@ -77,9 +112,10 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                 const FloatV along_y = hn::MulAdd(dz, hn::Set(d, c[5]), hn::Mul(dy, hn::Set(d, c[1])));
                 const FloatV along_z = hn::Mul(dz, hn::Set(d, c[2]));
                 const FloatV along = hn::MulAdd(along_z, dz, hn::MulAdd(along_y, dy, hn::Mul(along_x, dx)));
-                const auto& o = source.power_offset;
-                const FloatV lean =
-                    hn::MulAdd(dz, hn::Set(d, o[2]), hn::MulAdd(dy, hn::Set(d, o[1]), hn::Mul(dx, hn::Set(d, o[0]))));
+
+                hn::Store(dx, d, shares.way[0] + i * lanes);
+                hn::Store(dy, d, shares.way[1] + i * lanes);
+                hn::Store(dz, d, shares.way[2] + i * lanes);
 
                 // The segment of u = 1 + q/z0², and the place in it.
                 const FloatV u = hn::MulAdd(q, u_per_q, one);
@@ -93,18 +129,18 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                 const FloatV by_slope = hn::Mul(slope_scale, trace);
                 const FloatV twice = hn::Add(slope_scale, slope_scale);
                 const FloatV by_curvature = hn::Mul(hn::Mul(twice, twice), along);
-                const FloatV by_lean = hn::Mul(slope_scale, lean);
                 const FloatV area = hn::Set(d, source.area);
 
                 // Mean and variance of the distance over the source, for the ramp.
-                FloatV mean_r = one, half_width = one, inverse_width = one, spread = one;
+                FloatV mean_r = one, half_width = one, inverse_width = one, spread = one, half_per_r = one;
                 if constexpr (kHasRamp) {
                     const FloatV tiny = hn::Set(d, 1e-30f);
                     const FloatV variance = hn::Max(hn::Zero(d), hn::Div(along, hn::Add(hn::Add(q, trace), tiny)));
-                    mean_r = hn::Sqrt(hn::Max(hn::Zero(d), hn::Sub(hn::Add(hn::Add(q, trace), lean), variance)));
+                    mean_r = hn::Sqrt(hn::Max(hn::Zero(d), hn::Sub(hn::Add(q, trace), variance)));
                     half_width = hn::Add(hn::MulAdd(mean_r, hn::Set(d, 1e-6f), tiny),
                                          hn::Sqrt(hn::Mul(variance, hn::Set(d, 3.0f))));
                     inverse_width = hn::Div(one, half_width);
+                    half_per_r = hn::Div(hn::Set(d, 0.5f), hn::Add(mean_r, half_width));
                     spread = hn::Mul(hn::Mul(hn::Add(variance, variance), hn::Sqrt(q)), slope_scale);
                 }
 
@@ -121,15 +157,18 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                     const FloatV value = hn::MulAdd(v1, t, c0), slope = hn::MulAdd(s1, t, v1),
                                  bend = hn::MulAdd(h1, t, s1);
                     const FloatV even = hn::MulAdd(bend, by_curvature, hn::MulAdd(slope, by_slope, value));
-                    FloatV lit = hn::MulAdd(slope, by_lean, even);
                     FloatV& unshaded = channel == 0 ? unshaded0 : channel == 1 ? unshaded1 : unshaded2;
-                    unshaded = hn::MulAdd(lit, hn::Set(d, source.power[channel]), unshaded);
+                    unshaded = hn::MulAdd(even, hn::Set(d, source.power[channel]), unshaded);
+                    // The kernel with its ramp, and its derivative in q.
+                    FloatV lit = even, lit_slope = hn::Mul(slope, slope_scale);
                     if constexpr (kHasRamp) {
                         FloatV color, color_slope;
                         shade(ramp, channel, mean_r, half_width, inverse_width, color, color_slope);
-                        lit = hn::MulAdd(lit, color, hn::Mul(hn::Mul(slope, spread), color_slope));
+                        lit = hn::MulAdd(even, color, hn::Mul(hn::Mul(slope, spread), color_slope));
+                        lit_slope = hn::MulAdd(lit_slope, color, hn::Mul(hn::Mul(value, color_slope), half_per_r));
                     }
-                    hn::Store(lit, d, kernel[channel] + i * lanes);
+                    hn::Store(lit, d, shares.kernel[channel] + i * lanes);
+                    hn::Store(lit_slope, d, shares.slope[channel] + i * lanes);
                     FloatV& coverage = channel == 0 ? coverage0 : channel == 1 ? coverage1 : coverage2;
                     coverage = hn::MulAdd(even, area, coverage);
                 }
@@ -149,22 +188,12 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
             hn::Store(hn::Add(hn::Load(d, whole), unshaded2), d, whole);
 
             // Every group's three channels from the same kernels.
-            const float* power = list.powers.data() + tile * row;
-            for (std::size_t g = 0; g < groups; ++g, power += 3) {
-                FloatV sum0 = hn::Zero(d), sum1 = hn::Zero(d), sum2 = hn::Zero(d);
-                for (std::size_t i = 0; i < tile_size; ++i) {
-                    const float* p = power + i * row;
-                    sum0 = hn::MulAdd(hn::Load(d, kernel[0] + i * lanes), hn::Set(d, p[0]), sum0);
-                    sum1 = hn::MulAdd(hn::Load(d, kernel[1] + i * lanes), hn::Set(d, p[1]), sum1);
-                    sum2 = hn::MulAdd(hn::Load(d, kernel[2] + i * lanes), hn::Set(d, p[2]), sum2);
-                }
-                float* lit = block.exitance.data() + 3 * g * kBlockLanes + first;
-                hn::StoreU(hn::Add(hn::LoadU(d, lit), sum0), d, lit);
-                lit += kBlockLanes;
-                hn::StoreU(hn::Add(hn::LoadU(d, lit), sum1), d, lit);
-                lit += kBlockLanes;
-                hn::StoreU(hn::Add(hn::LoadU(d, lit), sum2), d, lit);
-            }
+            const GroupPower* powers = list.powers.data() + tile * groups;
+            float* lit = block.exitance.data() + first;
+            std::size_t g = 0;
+            for (; g + 4 <= groups; g += 4)
+                add_groups<4>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
+            for (; g < groups; ++g) add_groups<1>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
         }
     }
 }

@@ -13,6 +13,7 @@
 #include "frazil/base/vec.h"
 #include "frazil/points/cells.h"
 #include "frazil/points/point_set.h"
+#include "frazil/translucency/point_clusters.h"
 #include "frazil/translucency/profile.h"
 #include "frazil/translucency/ramp.h"
 
@@ -39,6 +40,10 @@ struct Gathered {
     std::vector<Rgb> layers;
 };
 
+// What trees sum, made once for all that sum the same.
+struct TreeKernel;
+std::shared_ptr<const TreeKernel> make_tree_kernel(const Profile& profile, const Ramp& ramp = {});
+
 class PointTree {
   public:
     struct Impl;
@@ -48,6 +53,10 @@ class PointTree {
     // ValueError where sizes disagree.
     PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::size_t groups, const Profile& profile,
               const Ramp& ramp = {}, const Cells* cells = nullptr, const std::vector<V3f>& moments = {});
+    // The light on points that are clustered already, in the order of the points that these were made of. Values that are
+    // not finite count as none here: the point's area stays.
+    PointTree(std::shared_ptr<const PointClusters> clusters, std::shared_ptr<const TreeKernel> kernel,
+              const std::vector<Rgb>& irradiance, std::size_t groups, const std::vector<V3f>& moments = {});
     ~PointTree();
     PointTree(PointTree&&) noexcept;
     PointTree& operator=(PointTree&&) noexcept;

@@ -1,0 +1,68 @@
+#include "frazil/render/placed_points.h"
+
+#include "frazil/base/parallel.h"
+
+namespace frazil {
+
+std::shared_ptr<const Cells> PointCloud::cells() const {
+    const std::lock_guard lock(mutex_);
+    return cells_;
+}
+
+void PointCloud::add_cells(bool needs_places, const std::function<Cells(const PointSet&)>& make) {
+    const std::lock_guard lock(mutex_);
+    if (cells_ && !(needs_places && cells_->places.empty())) return;
+    cells_ = std::make_shared<const Cells>(make(points_));
+    clusters_ = nullptr;
+}
+
+void PointCloud::drop_places() {
+    const std::lock_guard lock(mutex_);
+    if (!cells_ || cells_->places.empty()) return;
+    Cells moments;
+    moments.areas = cells_->areas;
+    moments.centroids = cells_->centroids;
+    moments.covariances = cells_->covariances;
+    cells_ = std::make_shared<const Cells>(std::move(moments));
+}
+
+std::shared_ptr<const PointClusters> PointCloud::clusters() {
+    const std::lock_guard lock(mutex_);
+    if (!clusters_) clusters_ = std::make_shared<const PointClusters>(cluster_points(points_, cells_.get()));
+    return clusters_;
+}
+
+std::shared_ptr<const PointLookup> PointCloud::lookup() {
+    const std::lock_guard lock(mutex_);
+    if (!lookup_) lookup_ = std::make_shared<const PointLookup>(points_);
+    return lookup_;
+}
+
+PointSet PlacedPoints::in_world() const {
+    if (!cloud_) return {};
+    PointSet result = cloud_->points();
+    for (V3f& position : result.positions) position = position * to_world_;
+    for (V3f& normal : result.normals) normal = transform_normal(normal, to_cloud_);
+    return result;
+}
+
+Cells PlacedPoints::cells_in_world() const {
+    Cells result = *cloud_->cells();
+    for (V3f& centroid : result.centroids) centroid = centroid * to_world_;
+    for (Covariance& c : result.covariances) {
+        // Turned row by row, then column by column.
+        V3f rows[3] = {{c[0], c[3], c[4]}, {c[3], c[1], c[5]}, {c[4], c[5], c[2]}};
+        for (V3f& row : rows) to_world_.multDirMatrix(V3f(row), row);
+        V3f columns[3];
+        for (int i = 0; i < 3; ++i) to_world_.multDirMatrix(V3f(rows[0][i], rows[1][i], rows[2][i]), columns[i]);
+        c = {columns[0].x, columns[1].y, columns[2].z, columns[0].y, columns[0].z, columns[1].z};
+    }
+    return result;
+}
+
+std::vector<V3f> PlacedPoints::into_cloud(std::vector<V3f> vectors) const {
+    for (V3f& v : vectors) to_cloud_.multDirMatrix(V3f(v), v);
+    return vectors;
+}
+
+}  // namespace frazil

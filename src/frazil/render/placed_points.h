@@ -1,0 +1,72 @@
+// A body's points where it stands: a cloud that all bodies of its shape share, and the way from there into the world.
+// Model: the way is a rotation or reflection and a move, so that distances and areas are the same in both.
+// Units: metres.
+// Valid: thread-safe.
+// Not: the light on the points, which every body has for itself (LitPoints).
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+
+#include "frazil/points/cells.h"
+#include "frazil/points/point_lookup.h"
+#include "frazil/points/point_set.h"
+#include "frazil/translucency/point_clusters.h"
+
+namespace frazil {
+
+class PointCloud {
+  public:
+    explicit PointCloud(PointSet points) : points_(std::move(points)) {}
+
+    const PointSet& points() const { return points_; }
+    // Null where light is baked at the points alone.
+    std::shared_ptr<const Cells> cells() const;
+    // Give it cells unless it has some; with places where `needs_places`.
+    void add_cells(bool needs_places, const std::function<Cells(const PointSet&)>& make);
+    // Places are of use to bakes alone.
+    void drop_places();
+
+    // Made when first asked for, with the cells that are there by then.
+    std::shared_ptr<const PointClusters> clusters();
+    std::shared_ptr<const PointLookup> lookup();
+
+  private:
+    PointSet points_;
+    mutable std::mutex mutex_;  // over what follows
+    std::shared_ptr<const Cells> cells_;
+    std::shared_ptr<const PointClusters> clusters_;
+    std::shared_ptr<const PointLookup> lookup_;
+};
+
+class PlacedPoints {
+  public:
+    PlacedPoints() = default;
+    PlacedPoints(std::shared_ptr<PointCloud> cloud, const M44f& to_world)
+        : cloud_(std::move(cloud)), to_world_(to_world), to_cloud_(to_world.inverse()) {}
+    // A cloud of its own, in the world already.
+    explicit PlacedPoints(PointSet points) : cloud_(std::make_shared<PointCloud>(std::move(points))) {}
+
+    PointCloud& cloud() const { return *cloud_; }
+    const M44f& to_cloud() const { return to_cloud_; }
+    std::size_t size() const { return cloud_ ? cloud_->points().size() : 0; }
+    double spacing() const { return cloud_ ? cloud_->points().spacing : 0.0; }
+
+    PointSet in_world() const;
+    // Moved into the world; places stay as they are.
+    Cells cells_in_world() const;
+    // Vectors of the world, such as moments of light, in the frame of the cloud.
+    std::vector<V3f> into_cloud(std::vector<V3f> vectors) const;
+    V3f into_cloud(const V3f& vector) const {
+        V3f turned;
+        to_cloud_.multDirMatrix(vector, turned);
+        return turned;
+    }
+
+  private:
+    std::shared_ptr<PointCloud> cloud_;
+    M44f to_world_, to_cloud_;
+};
+
+}  // namespace frazil
