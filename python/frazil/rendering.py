@@ -280,6 +280,8 @@ def _what_layers_hold(result: Any) -> dict[str, Any]:
 
 def _warn_of_unknown_labels(scene: Any, lpes: Mapping[str, str]) -> None:
     """Labels of expressions that match nothing, such as a misspelt light group: their layers would be black."""
+    if not lpes:
+        return
     lobes = ("diffuse", "specular", "refraction", "translucency")
     groups = dict.fromkeys(light.group or "default" for light in scene.lights)
     paths = [item.path for item in (*scene.objects, *scene.lights)]
