@@ -52,9 +52,10 @@ double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
 TEST_CASE("point gathers: a blend comes within some thousandths of a gather at the place") {
     const LitBall ball(Ramp({0.0f, 0.1f, 0.3f}, {Rgb(1.0f), Rgb(0.5f), Rgb(2.0f)}));
     PointGatherPlan plan = plenty();
-    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, plan);
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, 1, plan);
     REQUIRE(at_points);
     CHECK(plan.bytes < plenty().bytes);
+    CHECK(plan.paths == plenty().paths - double(ball.points.size()));
     const PointSet places = poisson_points(ball.scene.meshes[0], 0.1, {7});
     Gathered blended;
     std::vector<Rgb> thin;
@@ -75,7 +76,7 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
 TEST_CASE("point gathers: no rows off the surface or on its other side") {
     const LitBall ball;
     PointGatherPlan plan = plenty();
-    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, plan);
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, 1, plan);
     REQUIRE(at_points);
     Gathered rows;
     std::vector<Rgb> thin;
@@ -91,12 +92,12 @@ TEST_CASE("point gathers: none where paths are few, memory is short or the spaci
     PointGatherPlan few = plenty(), tight = plenty(), plan = plenty();
     few.paths = double(ball.points.size()) - 1.0;
     tight.bytes = 1000;
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, few));
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, tight));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, 1, few));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, 1, tight));
     CHECK(tight.bytes == 1000);
     PointSet uneven = ball.points;
     uneven.spacing *= 2.0;
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], uneven, plan));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], uneven, 1, plan));
 }
 
 }  // namespace frazil

@@ -35,6 +35,12 @@ inline V2f cos_sin_turns(float turns) {
     return (quarter & 2) ? V2f(-x, -y) : V2f(x, y);
 }
 
+// A direction about +z whose density is the cosine over pi.
+inline V3f cosine_hemisphere(const V2f& u) {
+    const V2f circle = cos_sin_turns(u.y) * std::sqrt(u.x);
+    return {circle.x, circle.y, std::sqrt(std::max(0.0f, 1.0f - u.x))};
+}
+
 inline float fast_atan2(float y, float x) {
     const float ax = std::abs(x), ay = std::abs(y);
     const float largest = std::max(std::max(ax, ay), 1e-37f);

@@ -82,6 +82,7 @@ Estimator estimator_named(const std::string& name);
 
 void bind_geometry(nb::module_& module);
 void bind_material(nb::module_& module);
+void bind_density(nb::module_& module);
 void bind_texture(nb::module_& module);
 void bind_points(nb::module_& module);
 void bind_translucency(nb::module_& module);

@@ -31,13 +31,11 @@ void sample_cosine(std::size_t begin, std::size_t end, BakeRays& rays) {
     for_each_place(begin, end, rays, [&](const Place& place, std::size_t first, std::size_t count) {
         const auto [s, t] = tangent_frame(place.normal);
         for (std::size_t i = first; i < first + count; ++i) {
-            const V2f& u = rays.u[i];
-            const V2f circle = cos_sin_turns(u.y) * std::sqrt(u.x);
-            const float cosine = std::sqrt(std::max(0.0f, 1.0f - u.x));
+            const V3f local = cosine_hemisphere(rays.u[i]);
             LightSample& sample = rays.samples[i];
             sample = LightSample();
-            sample.direction = s * circle.x + t * circle.y + place.normal * cosine;
-            sample.pdf = cosine * kInvPi;
+            sample.direction = s * local.x + t * local.y + place.normal * local.z;
+            sample.pdf = local.z * kInvPi;
         }
     });
 }

@@ -23,7 +23,6 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     Irradiance result;
     result.groups = groups;
     result.values.assign(points.size() * groups, Rgb(0.0f));
-    if (options.cells.cells) result.moments.assign(result.values.size(), V3f(0.0f));
     result.rays = std::uint64_t(points.size()) * std::uint64_t(options.samples);
     const ScrambledNet net(options.samples);
     std::atomic<std::uint64_t> dropped{0};
@@ -38,26 +37,21 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
             find_places(points, options.cells, std::uint32_t(i), places);
             net.draw(hash(options.seed, 0x626f756eU), std::uint32_t(i), u);
             deal(places, 0, hash(options.seed, std::uint32_t(i)), place_of);
-            const std::size_t first = hits.size();
-            V3f sum(0.0f);
             for (std::size_t k = 0; k < u.size(); ++k) {
                 const Place& place = places[place_of[k]];
-                sum += place.position - places[0].position;
-                const V2f circle = cos_sin_turns(u[k].y) * std::sqrt(u[k].x);
+                const V3f local = cosine_hemisphere(u[k]);
                 const auto [s, t] = tangent_frame(place.normal);
                 BounceHit hit;
                 hit.point = std::uint32_t(i);
-                hit.direction = s * circle.x + t * circle.y + place.normal * std::sqrt(std::max(0.0f, 1.0f - u[k].x));
+                hit.direction = s * local.x + t * local.y + place.normal * local.z;
                 const V3f origin = offset_origin(place.position, place.normal);
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.position = origin + hit.direction * hit.surface.t;
                 // Cosine-distributed rays leave pi T L / n.
                 hit.weight =
                     kPi * transmittance(std::max(0.0f, hit.direction.dot(place.normal))) / float(options.samples);
-                hit.offset = place.position - places[0].position;
                 hits.push_back(hit);
             }
-            for (std::size_t k = first; k < hits.size(); ++k) hits[k].offset -= sum / float(u.size());
         }
         // Ask what the surfaces send, and let it in.
         std::vector<Rgb> sent(hits.size() * groups, Rgb(0.0f));
@@ -69,11 +63,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                     ++dropped;
                     continue;
                 }
-                const std::size_t at = hits[i].point * groups + g;
-                result.values[at] += value;
-                if (!result.moments.empty()) {
-                    result.moments[at] += hits[i].offset * (value.x + value.y + value.z);
-                }
+                result.values[hits[i].point * groups + g] += value;
             }
         }
         const std::size_t finished = done += end - begin;

@@ -21,7 +21,6 @@ struct BounceHit {
     V3f position;             // on the surface, metres
     V3f direction;            // from the point to the surface, unit length
     float weight = 0.0f;      // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
-    V3f offset;               // metres: from the mean start of the point's rays to where this one starts
     Hit surface;
 };
 

@@ -220,9 +220,8 @@ Occlusion bake_occlusion(const PointSet& points, const RayScene& scene, const Oc
             const auto [s, t] = tangent_frame(normal);
             net.draw(options.seed, std::uint32_t(i), u);
             for (std::size_t k = 0; k < u.size(); ++k) {
-                const V2f circle = cos_sin_turns(u[k].y) * std::sqrt(u[k].x);
-                const float cosine = std::sqrt(std::max(0.0f, 1.0f - u[k].x));
-                rays[k] = {origin, s * circle.x + t * circle.y + normal * cosine, 0.0f, options.distance};
+                const V3f local = cosine_hemisphere(u[k]);
+                rays[k] = {origin, s * local.x + t * local.y + normal * local.z, 0.0f, options.distance};
             }
             scene.are_occluded(rays, is_hidden);
             int open = 0;

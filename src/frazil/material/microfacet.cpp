@@ -49,11 +49,6 @@ float fresnel_f0(float eta) {
     return r * r;
 }
 
-V3f cosine_hemisphere(const V2f& u) {
-    const float r = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
-    return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1.0f - u.x))};
-}
-
 float schlick_weight(float cos_theta) {
     const float m = std::clamp(1.0f - cos_theta, 0.0f, 1.0f), m2 = m * m;
     return m2 * m2 * m;

@@ -23,9 +23,6 @@ float blurred_roughness(float roughness, float blur);
 // F0 of a dielectric boundary: ((eta-1)/(eta+1))².
 float fresnel_f0(float eta);
 
-// A direction above the surface, in proportion to its cosine.
-V3f cosine_hemisphere(const V2f& u);
-
 // (1 - cos)^5: how far Schlick's approximation goes from F0 to 1.
 float schlick_weight(float cos_theta);
 

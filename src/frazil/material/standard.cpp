@@ -1,5 +1,6 @@
 #include "frazil/material/standard.h"
 
+#include "frazil/base/trigonometry.h"
 #include "frazil/material/microfacet.h"
 
 namespace frazil {

@@ -196,7 +196,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
         }
-        body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), plan);
+        body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), groups, plan);
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();
     }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
 
-// Rays that look around from all points together, at most, so that what they find fits in memory: some 40 bytes each where
+// Rays that look around from all points together, at most, so that what they find fits in memory: 28 bytes each where
 // they meet ice.
 constexpr std::size_t kMostSightlines = std::size_t(1) << 27;
 
@@ -182,9 +182,6 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             },
             [&](float cosine) { return bodies[i]->transmittance(cosine, bodies[i]->material->roughness.value); },
             bake_options, progress);
-        // Bounced light is even over a cell, as far as so few rays can tell.
-        last[i].moments = {};
-        last[i].errors = {};
         stats.bake_rays += last[i].rays;
         stats.dropped_samples += last[i].dropped_samples;
     }

@@ -61,10 +61,9 @@ void Openness::answer(Tile& tile) const {
         for (std::size_t i = begin; i < end; ++i) {
             const SeenPlace& place = tile.places[i];
             const auto [s, t] = tangent_frame(place.normal);
-            const V2f circle = cos_sin_turns(place.u.y) * std::sqrt(place.u.x);
-            const float cosine = std::sqrt(std::max(0.0f, 1.0f - place.u.x));
+            const V3f local = cosine_hemisphere(place.u);
             rays.push_back(
-                {offset_origin(place.position, place.normal), s * circle.x + t * circle.y + place.normal * cosine});
+                {offset_origin(place.position, place.normal), s * local.x + t * local.y + place.normal * local.z});
         }
         is_hidden.resize(rays.size());
         scene_.are_occluded(rays, is_hidden);

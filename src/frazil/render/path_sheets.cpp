@@ -1,6 +1,7 @@
 // Paths: fracture planes inside ice.
 #include <algorithm>
 
+#include "frazil/base/trigonometry.h"
 #include "frazil/render/path.h"
 #include "frazil/render/path_state.h"
 

@@ -17,8 +17,9 @@ bool is_even(const PointSet& points) {
     return double(points.size()) * points.spacing * points.spacing < kVaries * kPointsPerSpacing2 * area;
 }
 
-std::size_t bytes_per_point(const Gathered& gathered, bool has_thickness) {
-    return sizeof(Rgb) * (gathered.groups * (1 + gathered.knots) + 1 + has_thickness) + sizeof(V3f) * 2 + 12;
+// Sums, coverage, thickness and layers of a point, and its place in the lookup.
+std::size_t bytes_per_point(std::size_t groups, std::size_t knots, bool has_thickness) {
+    return sizeof(Rgb) * (groups * (1 + knots) + 1 + has_thickness) + sizeof(V3f) * 2 + 12;
 }
 
 void add(Rgb* sum, const Rgb* row, std::size_t count, float weight) {
@@ -27,16 +28,16 @@ void add(Rgb* sum, const Rgb* row, std::size_t count, float weight) {
 
 }  // namespace
 
-std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointSet& points,
+std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointSet& points, std::size_t groups,
                                                        PointGatherPlan& plan) {
     if (plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points)) return nullptr;
     GatherOptions options = plan.gather;
     options.ramp_layers = plan.keeps_knots && !body.material->ramp.is_empty();
-    // One gather tells how long a row is.
-    const Gathered one = body.tree->gather(points.positions.data(), 1, options);
-    const std::size_t bytes = points.size() * bytes_per_point(one, body.thickness != nullptr);
+    const std::size_t knots = options.ramp_layers ? body.material->ramp.distances.size() : 0;
+    const std::size_t bytes = points.size() * bytes_per_point(groups, knots, body.thickness != nullptr);
     if (bytes > plan.bytes) return nullptr;
     plan.bytes -= bytes;
+    plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(points, kReach * static_cast<float>(points.spacing)));
     result->at_points_ = body.tree->gather(points.positions.data(), points.size(), options);
     result->thin_ = thickness_gains(body.thickness.get(), points.positions.data(), points.size(), options);

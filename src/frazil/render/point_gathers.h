@@ -8,7 +8,7 @@
 // Not: what the camera sees itself, which is gathered where it is seen.
 #pragma once
 
-#include <span>
+#include <memory>
 #include <vector>
 
 #include "frazil/points/point_lookup.h"
@@ -20,7 +20,7 @@ struct Body;
 
 // Whether gathers at all points are worth their time and memory.
 struct PointGatherPlan {
-    double paths = 0.0;        // of the whole picture: more of them than points pay for the gathers
+    double paths = 0.0;        // of the whole picture, less the points that were gathered at: they are never the more
     std::size_t bytes = 0;     // that are left for all bodies
     GatherOptions gather;      // of the render
     bool keeps_knots = false;  // gathers ask for ramp layers where a body has a ramp
@@ -28,9 +28,10 @@ struct PointGatherPlan {
 
 class PointGathers {
   public:
-    // Null where the plan has no use for it, or the points' spacing varies. Takes its memory off the plan's. The body has
-    // its trees already.
-    static std::shared_ptr<const PointGathers> make(const Body& body, const PointSet& points, PointGatherPlan& plan);
+    // Null where the plan has no use for it, or the points' spacing varies. Takes its points and memory off the plan's. The
+    // body has its trees already, of so many light groups.
+    static std::shared_ptr<const PointGathers> make(const Body& body, const PointSet& points, std::size_t groups,
+                                                    PointGatherPlan& plan);
 
     // Append to `gathered` and `thin` (thickness_gains; left empty where the body has none) the row of a place on the
     // surface with this outward normal; false where no point is near.

@@ -31,9 +31,9 @@ std::vector<LightReceiver> receivers_in_view(const Camera& camera, float aspect,
         if (!meet(scene, camera_ray(camera, x, y, aspect), first)) continue;
         receivers.push_back(first);
 
-        const V2f u = random.next_2d(), circle = cos_sin_turns(u.y) * std::sqrt(u.x);
+        const V3f local = cosine_hemisphere(random.next_2d());
         const auto [s, t] = tangent_frame(first.normal);
-        const V3f direction = s * circle.x + t * circle.y + first.normal * std::sqrt(std::max(0.0f, 1.0f - u.x));
+        const V3f direction = s * local.x + t * local.y + first.normal * local.z;
         if (meet(scene, {offset_origin(first.position, first.normal), direction}, second)) receivers.push_back(second);
     }
     return receivers;

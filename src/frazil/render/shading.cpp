@@ -2,6 +2,8 @@
 
 #include <tuple>
 
+#include "frazil/base/trigonometry.h"
+
 namespace frazil {
 
 Shader::Shader(const Surface& surface, const Body* body, float blur)

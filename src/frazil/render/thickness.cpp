@@ -19,8 +19,7 @@ float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u,
     const auto [s, t] = tangent_frame(inward);
     float sum = 0.0f;
     for (const V2f& v : u) {
-        const V2f circle = cos_sin_turns(v.y) * std::sqrt(v.x);
-        const V3f direction = s * circle.x + t * circle.y + inward * std::sqrt(std::max(0.0f, 1.0f - v.x));
+        const V3f local = cosine_hemisphere(v), direction = s * local.x + t * local.y + inward * local.z;
         Hit hit;
         if (shells) {
             sum += shells->way_through({origin, direction});

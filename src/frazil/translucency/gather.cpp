@@ -158,10 +158,7 @@ struct Cut {
     }
 };
 
-// Irradiance that arrives, against what the coverage would bring of the mean irradiance: steps of it.
-constexpr std::array<double, 4> kDarkness = {1.0, 0.1, 0.01, 0.001};
-
-// Which of these a block needs: the darkest channel and shading point decide, all groups' light together.
+// Which level of darkness a block needs: the darkest channel and shading point decide, all groups' light together.
 std::size_t darkness_level(const PointTree::Impl& tree, const BlockSums& block) {
     float darkest = 1.0f;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -233,10 +230,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     const std::vector<KeyedIndex> order = sorted_positions(tree, positions, count);
     if (tree.clusters->nodes.empty()) return out;
 
-    // One rule for lit places, and stricter ones for the darker.
-    std::vector<OpeningRule> rules;
-    for (const double darkness : kDarkness)
-        rules.emplace_back(kernel.profile, kernel.table, !kernel.ramp.is_empty(), options.tolerance, darkness);
+    const std::vector<OpeningRule>& rules = kernel.rules(options.tolerance);
     const RampHinges ramp = hinges_of(kernel.ramp, kernel.ramp_scale);
     std::vector<RampHinges> hats;
     for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(kernel.ramp, k), Rgb(1.0f)));

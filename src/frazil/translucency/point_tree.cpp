@@ -112,6 +112,15 @@ TreeKernel::TreeKernel(const Profile& of_profile, const Ramp& with_ramp)
       ramp_scale(energy_scale(with_ramp, of_profile)),
       table(tabulate(of_profile)) {}
 
+const std::vector<OpeningRule>& TreeKernel::rules(float tolerance) const {
+    const std::lock_guard lock(mutex_);
+    std::vector<OpeningRule>& made = rules_[tolerance];
+    for (std::size_t level = made.size(); level < kDarkness.size(); ++level) {
+        made.emplace_back(profile, table, !ramp.is_empty(), tolerance, kDarkness[level]);
+    }
+    return made;
+}
+
 std::shared_ptr<const TreeKernel> make_tree_kernel(const Profile& profile, const Ramp& ramp) {
     check_ramp(ramp, "Ramp");
     return std::make_shared<const TreeKernel>(profile, ramp);

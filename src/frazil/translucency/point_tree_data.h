@@ -7,10 +7,13 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <mutex>
 #include <vector>
 
 #include "frazil/base/vec.h"
 #include "frazil/translucency/kernel_table.h"
+#include "frazil/translucency/opening_rule.h"
 #include "frazil/translucency/point_clusters.h"
 #include "frazil/translucency/point_tree.h"
 
@@ -27,6 +30,10 @@ inline float lean_reach(const TreeNode& node) {
     return node.radius + 4.0f * std::sqrt(node.footprint);
 }
 
+// Irradiance that arrives, against what the coverage would bring of the mean irradiance: steps of it, each with a stricter
+// rule.
+inline constexpr std::array<double, 4> kDarkness = {1.0, 0.1, 0.01, 0.001};
+
 // What a tree sums: a profile and a ramp, tabulated.
 struct TreeKernel {
     Profile profile;
@@ -35,6 +42,13 @@ struct TreeKernel {
     KernelTable table;
 
     TreeKernel(const Profile& profile, const Ramp& ramp);
+
+    // One for each darkness; made when a tolerance is first asked for, by any thread. They stay where they are.
+    const std::vector<OpeningRule>& rules(float tolerance) const;
+
+  private:
+    mutable std::mutex mutex_;
+    mutable std::map<float, std::vector<OpeningRule>> rules_;  // by tolerance
 };
 
 struct PointTree::Impl {
