@@ -28,7 +28,7 @@ needs_openvdb = pytest.mark.skipif(not has_openvdb(), reason="no library that re
 
 
 def cloud_frame():
-    """Voxels of clouds.vdb to its frame, as bench/vdb_files.py says."""
+    """Voxels of clouds.vdb to its frame, as tests/data/clouds.py says."""
     c, s = np.cos(0.5), np.sin(0.5)
     return np.array([[0.1 * c, 0.1 * s, 0, 0], [-0.2 * s, 0.2 * c, 0, 0], [0, 0, 0.05, 0], [1, 2, 3, 1]])
 

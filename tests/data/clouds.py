@@ -1,6 +1,6 @@
-"""Writes the small OpenVDB files that tests read, with OpenVDB's own module.
+"""Writes the small OpenVDB file that tests read, with OpenVDB's own module.
 
-    PYTHONPATH=<where openvdb is, e.g. bpy/5.0/python/lib/python3.11/site-packages> python bench/vdb_files.py tests/data
+    PYTHONPATH=<where openvdb is, e.g. bpy/5.0/python/lib/python3.11/site-packages> python tests/data/clouds.py FOLDER
 
 clouds.vdb holds a grid `density` of 4 x 5 x 6 voxels from (-2, 3, 1) on under a turned frame, of values
 (i + 10 j + 100 k + 1) / 1000, a level set `distance` and a grid `tiled` with a constant tile.
