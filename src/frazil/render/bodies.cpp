@@ -159,9 +159,10 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
-                 const std::function<void(std::size_t)>& has_taken) {
+TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
+                             const RayScene& ray_scene, bool wants_depth, PointGatherPlan plan,
+                             std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                             const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
     // A bake from elsewhere has no cells: make those that its light was a mean over.
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -171,7 +172,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             false, [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
         cloud.drop_places();
     }
-    const TranslucencySets sets(scene, ray_scene, bodies, lit);
+    TranslucencySets sets(scene, ray_scene, bodies, lit);
     stats.warnings.insert(stats.warnings.end(), sets.warnings().begin(), sets.warnings().end());
     ThicknessTrees thickness(scene, ray_scene, bodies, sets);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -190,8 +191,8 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         body.tree =
             is_alone ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
                      : make_tree(sets.points(i), body.kernel,
-                                 sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
-                                 sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
+                                 sets.united(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
+                                 sets.united(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
         if (is_alone) has_taken(i);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
@@ -200,6 +201,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();
     }
+    return sets;
 }
 
 std::vector<Passage> passages_of(const Scene& scene) {
