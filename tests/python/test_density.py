@@ -83,7 +83,8 @@ def test_openvdb_s_own_module_reads_what_tinyvdb_reads_and_tiles():
         np.testing.assert_allclose(value, expected, atol=1e-6)
     values = grids._read_openvdb(openvdb, CLOUDS, "tiled")[0]
     assert values.shape == (18, 18, 18)
-    assert np.all(values[1:-1, 1:-1, 1:-1] == 2.0) and values.sum() == 2.0 * 16**3
+    assert np.all(values[1:-1, 1:-1, 1:-1] == 2.0)
+    assert values.sum() == 2.0 * 16**3
 
 
 @needs_own_module

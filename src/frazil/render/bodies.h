@@ -25,10 +25,11 @@
 namespace frazil {
 
 struct Body {
-    Body(const IceMaterial* of_material, std::shared_ptr<const DielectricAlbedo> with_boundary,
+    Body(const IceMaterial* of_material, const Medium& of_medium, std::shared_ptr<const DielectricAlbedo> with_boundary,
          const Profile& with_profile, std::shared_ptr<const TreeKernel> sum,
          std::shared_ptr<const TreeKernel> plain_sum)
         : material(of_material),
+          medium(of_medium),
           boundary(std::move(with_boundary)),
           profile(with_profile),
           kernel(std::move(sum)),
@@ -36,14 +37,15 @@ struct Body {
           total_reflectance(albedo(with_profile)) {}
 
     const IceMaterial* material = nullptr;
+    Medium medium;  // of the core: the material's at the body's mean density
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
     std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
     Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
     // Trees stand where their points do: places are brought there by `to_points`.
     M44f to_points;
-    std::shared_ptr<const PointTree> tree;          // none where the object has no surface; one for a translucency set
-    std::shared_ptr<const PointTree> thickness;     // ThicknessTrees
+    std::shared_ptr<const PointTree> tree;       // none where the object has no surface; one for a translucency set
+    std::shared_ptr<const PointTree> thickness;  // ThicknessTrees
     // plant_overlay_trees, where such layers are asked for; which layers its columns are.
     std::shared_ptr<const PointTree> overlay_tree;
     std::vector<std::uint32_t> overlay_layers;
@@ -116,8 +118,8 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
 // seen. So bounces keep energy, and a picture's compensation can be changed exactly after its render. `gains` as above.
 void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
-// What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
-// absorbs; others nothing.
+// What each object lets through for shadow rays: ice what its boundary transmits and its medium, as dense as it is in each
+// place, neither scatters nor absorbs; others nothing. The scene must outlive these.
 std::vector<Passage> passages_of(const Scene& scene);
 
 // One entry per object of the scene, without trees; null for those that are not ice.

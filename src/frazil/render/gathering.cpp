@@ -78,7 +78,7 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
         answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
         is_blended.push_back(i);
     }
-    const Medium& medium = body.material->medium;
+    const Medium& medium = body.medium;
     const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
     const std::vector<V3f> at_tree = moved(places, body.to_points);

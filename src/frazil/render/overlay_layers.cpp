@@ -62,8 +62,8 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
             resolver.taken_by_overlays(static_cast<std::uint32_t>(i), lit[i].points.in_world());
         const std::size_t overlays = layers_of(i).size();
         for (std::size_t k = 0; k < overlays; ++k) {
-            const auto column = static_cast<std::size_t>(
-                std::find(columns.begin(), columns.end(), layers_of(i)[k]) - columns.begin());
+            const auto column =
+                static_cast<std::size_t>(std::find(columns.begin(), columns.end(), layers_of(i)[k]) - columns.begin());
             for (std::size_t n = 0; n < lit[i].points.size(); ++n) {
                 for (std::size_t g = 0; g < groups; ++g) {
                     result[(n * columns.size() + column) * groups + g] =
@@ -86,8 +86,8 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
             return sets.united(i, columns, of);
         };
         bodies[i]->overlay_layers = layers[i];
-        bodies[i]->overlay_tree = make_tree(sets.points(i), bodies[i]->kernel, all_taken(&LitPoints::irradiance), columns,
-                                            all_taken(&LitPoints::moments));
+        bodies[i]->overlay_tree = make_tree(sets.points(i), bodies[i]->kernel, all_taken(&LitPoints::irradiance),
+                                            columns, all_taken(&LitPoints::moments));
     }
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || sets.is_leader(i)) continue;
