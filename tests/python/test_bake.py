@@ -4,7 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from small_scenes import ice_over_floor
+from small_scenes import ice_over_floor, placed
 
 import frazil as fz
 from frazil.baking import refresh_bake
@@ -125,3 +125,14 @@ def test_a_bake_of_another_scene_is_refused():
     scene.add_light(fz.Light(fz.DomeLight(), group="extra"))
     with pytest.raises(ValueError, match="light groups must be the scene's"):
         fz.render(scene, bake=bake, resolution=(8, 8), samples=1, **OPTIONS)
+
+
+def test_points_too_far_apart_are_warned_of_once_for_all_bodies_alike():
+    scene = ice_over_floor()
+    ball = scene.objects[0]
+    for i in range(3):
+        scene.add_object(f"/Ball{i}", ball.mesh, ball.material, placed(3.0 + i))
+    with pytest.warns(fz.FrazilWarning) as told:
+        fz.bake(scene, spacing=0.8)
+    assert len(told) == 1
+    assert str(told[0].message).startswith("/Ball (and 3 more bodies): points are 0.8 m apart, 8.04 mean free paths")

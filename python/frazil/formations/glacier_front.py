@@ -120,12 +120,12 @@ def glacier_front(
 
     surface = grow(body, budget, rounding=0.08 + 0.5 * age**1.5, large=large, fine=melt.fine, progress=progress)
     parts = [Part.of("Ice", surface, "Ice", "ice"), water(seed, 8.0, budget, surface, 60.0, reach=4.0)]
-    image, lights = sky_and_lights(seed, (-0.72, 0.38, 0.42), sun_light=3.6)
+    image, lights = sky_and_lights(seed, (-0.8, 0.36, 0.5), sun_light=3.0)
     return Formation(
         "glacier_front",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, crevasses=crevasses),
         parts,
-        {"Ice": ice("old_glacier", age, 12.0, refraction=0.2), "Water": kWater},
+        {"Ice": ice("old_glacier", age, 12.0, refraction=0.1), "Water": kWater},
         lights,
         CameraRow((16.0, 7.0, 82.0), (-2.0, 15.0, 0.0), 30.0),
         image,

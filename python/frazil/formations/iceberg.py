@@ -92,12 +92,12 @@ def iceberg(
 
     surface = grow(body, budget, rounding=0.06 + 0.4 * age**1.5, large=large, fine=melt.fine, progress=progress)
     parts = [Part.of("Ice", surface, "Ice", "ice"), water(seed, 6.0, budget, surface, 60.0, reach=2.5)]
-    image, lights = sky_and_lights(seed, (-0.78, 0.34, -0.25), sun_light=4.2)
+    image, lights = sky_and_lights(seed, (-0.9, 0.36, 0.12), sun_light=3.6)
     return Formation(
         "iceberg",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, peaks=peaks),
         parts,
-        {"Ice": ice("weathered_white", 0.7 * age, 5.0, refraction=0.3), "Water": kWater},
+        {"Ice": ice("weathered_white", 0.7 * age, 5.0, refraction=0.12), "Water": kWater},
         lights,
         CameraRow((9.0, 3.2, 42.0), (0.0, 4.4, 0.0), 35.0),
         image,

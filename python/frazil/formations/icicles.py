@@ -87,7 +87,7 @@ def icicles(
         "icicles",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count),
         parts,
-        {"Ice": ice("fresh_breath", age, 0.12), "Rock": kRock, "Snow": kSnow},
+        {"Ice": ice("fresh_breath", 0.5 * age, 0.6, refraction=0.9), "Rock": kRock, "Snow": kSnow},
         lights,
         CameraRow((0.25, -0.42, 2.05), (0.0, -0.28, 0.0), 35.0),
         image,

@@ -163,11 +163,33 @@ class Shapes {
     std::multimap<std::uint32_t, Shape> shapes_;
 };
 
+// Bodies whose points are too far apart for their medium: one warning for all those that are alike, as instances are.
+class CoarsePoints {
+  public:
+    void add(const std::string& path, float spacing, float mean_free_path) {
+        if (spacing > kCoarse * mean_free_path) paths_[{spacing, mean_free_path}].push_back(path);
+    }
+
+    void warn(std::vector<std::string>& warnings) const {
+        for (const auto& [distances, paths] : paths_) {
+            const auto [spacing, mean_free_path] = distances;
+            const std::string others = paths.size() > 1 ? str(" (and ", paths.size() - 1, " more bodies)") : "";
+            warnings.push_back(str(paths.front(), others, ": points are ", spacing, " m apart, ",
+                                   spacing / mean_free_path, " mean free paths: single points may show. Set the ",
+                                   "material's spacing, or a longer mean free path for a body of this size."));
+        }
+    }
+
+  private:
+    std::map<std::pair<float, float>, std::vector<std::string>> paths_;
+};
+
 // The points of every body that has none yet.
 void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies, const RenderOptions& options,
                 std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress) {
     Stopwatch watch(stats.seconds["points"]);
     Shapes shapes(scene);
+    CoarsePoints coarse;
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() > 0) continue;
         const Object& object = scene.objects[i];
@@ -175,19 +197,14 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
         if (!(shape.area > 0.0)) continue;
         try {
             const float spacing = point_spacing(*bodies[i], shape.area, options);
-            const float mean_free_path =
-                1.0f / max_component(bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a);
-            if (spacing > kCoarse * mean_free_path) {
-                stats.warnings.push_back(
-                    str(object.path, ": points are ", spacing, " m apart, ", spacing / mean_free_path,
-                        " mean free paths: single points may show. Set the ",
-                        "material's spacing, or a longer mean free path for a body of this size."));
-            }
+            const Rgb extinction = bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a;
+            coarse.add(object.path, spacing, 1.0f / max_component(extinction));
             lit[i].points = shapes.points_of(object, shape, spacing, options, progress);
         } catch (const ValueError& error) {
             throw ValueError(str(object.path, ": ", error.what()));
         }
     }
+    coarse.warn(stats.warnings);
 }
 
 struct EnteringLight {
