@@ -1,10 +1,10 @@
 """`denoise_film`: Open Image Denoise on the ray-traced layers, each by itself, so that they still sum to the beauty.
 
-Model: translucency comes from points, so it stays as it is; so do emission and background. Every other additive layer is
-denoised apart, per light group where there are groups, guided by albedo and normal (which are taken for clean); layers and
-beauty are summed anew. Where light is seen through ice, a path gives what it does not let through to the core: what
-translucency lacks in a pixel, refraction and volume have there, as the guides do not tell. So these are denoised with
-translucency as well, and what that sum has in a pixel beyond the parts is theirs.
+Model: translucency comes from points, so it stays as it is; so do emission and background. Every other additive layer
+is denoised apart, per light group where there are groups, guided by albedo and normal (which are taken for clean);
+layers and beauty are summed anew. Where light is seen through ice, a path gives what it does not let through to the
+core: what translucency lacks in a pixel, refraction and volume have there, as the guides do not tell. So these are
+denoised with translucency as well, and what that sum has in a pixel beyond the parts is theirs.
 Valid: where negative lights make a layer negative, its positive and its negative part are denoised apart.
 Not: animation; every frame is on its own.
 """
@@ -19,7 +19,7 @@ __all__ = ["check_denoiser", "denoise_film"]
 
 NOISELESS = ("translucency", "emission", "background")
 SEEN_THROUGH = ("refraction", "volume")
-# Of a pixel's light; with less of it the core's own detail, which the denoiser would soften, weighs more than the split.
+# Of a pixel's light; with less of it the core's own detail, which the denoiser would soften, weighs more.
 MUCH_SEEN_THROUGH = 0.4
 
 
