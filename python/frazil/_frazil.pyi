@@ -559,9 +559,14 @@ class DomeLight:
     ----------
     image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a
         uniform dome. Copied.
+    portals : list of (4, 4) float64, openings that the light comes through: the unit square in x and y to
+        the world, for row vectors; light goes along its -z. They guide sampling alone.
     """
 
-    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight') -> None: ...
+    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight', portals: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)]] = []) -> None: ...
+
+    @property
+    def portals(self) -> list: ...
 
     @property
     def has_image(self) -> bool: ...

@@ -46,13 +46,24 @@ void bind_lights(nb::module_& module) {
         "Light from all around.\n\n"
         "Parameters\n----------\n"
         "image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a\n"
-        "    uniform dome. Copied.")
+        "    uniform dome. Copied.\n"
+        "portals : list of (4, 4) float64, openings that the light comes through: the unit square in x and y to\n"
+        "    the world, for row vectors; light goes along its -z. They guide sampling alone.")
         .def(
             "__init__",
-            [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path) {
-                new (self) DomeLight{to_image<Environment>(image, path)};
+            [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path,
+               const std::vector<MatrixArray>& portals) {
+                DomeLight light{to_image<Environment>(image, path)};
+                for (const MatrixArray& portal : portals) light.portals.push_back(to_matrix(portal));
+                new (self) DomeLight(std::move(light));
             },
-            "image"_a = nb::none(), "path"_a = "DomeLight")
+            "image"_a = nb::none(), "path"_a = "DomeLight", "portals"_a = std::vector<MatrixArray>())
+        .def_prop_ro("portals",
+                     [](const DomeLight& light) {
+                         nb::list matrices;
+                         for (const M44f& portal : light.portals) matrices.append(from_matrix(portal));
+                         return matrices;
+                     })
         .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
         .def_prop_ro(
             "image", [](nb::handle self) { return image_of<DomeLight>(self); }, "(height, width, 3) float32, or None.")

@@ -73,9 +73,25 @@ struct SizeFactor {
     double operator()(const MeshLight& mesh) const { return surface_area(transformed(*mesh.mesh, m)); }
 };
 
+void check_transform(const Light& light, const char* field, const M44f& m) {
+    for (int i = 0; i < 4; ++i) {
+        for (int j = 0; j < 4; ++j) {
+            if (std::isfinite(m[i][j])) continue;
+            throw ValueError(str(light.path, ": ", field, " must be finite, got ", m[i][j], "."));
+        }
+    }
+    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    const double volume = std::abs(x.cross(y).dot(z));
+    if (volume > 1e-12 * x.length() * y.length() * z.length()) return;
+    throw ValueError(
+        str(light.path, ": ", field, " must be invertible, got determinant ", volume, ". Remove the zero scale."));
+}
+
 struct CheckShape {
     const Light& light;
-    void operator()(const DomeLight&) const {}
+    void operator()(const DomeLight& dome) const {
+        for (const M44f& portal : dome.portals) check_transform(light, "portals", portal);
+    }
     void operator()(const DistantLight& distant) const {
         if (distant.angle >= 0.0f && distant.angle <= 360.0f) return;
         throw ValueError(str(light.path, ": angle must be in [0, 360] degrees, got ", distant.angle, "."));
@@ -142,23 +158,10 @@ void check_light(const Light& light) {
             throw ValueError(str(light.path, ": multipliers must be finite, got ", multiplier, "."));
         }
     }
-    for (int i = 0; i < 4; ++i) {
-        for (int j = 0; j < 4; ++j) {
-            if (!std::isfinite(light.light_to_world[i][j])) {
-                throw ValueError(str(light.path, ": transform must be finite, got ", light.light_to_world[i][j], "."));
-            }
-        }
-    }
+    check_transform(light, "transform", light.light_to_world);
     check_shaping(light);
     check_shadow(light);
     std::visit(CheckShape{light}, light.shape);
-    const M44f& m = light.light_to_world;
-    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
-    const double volume = std::abs(x.cross(y).dot(z));
-    if (!(volume > 1e-12 * x.length() * y.length() * z.length())) {
-        throw ValueError(
-            str(light.path, ": transform must be invertible, got determinant ", volume, ". Remove the zero scale."));
-    }
 }
 
 double size_factor(const Light& light) {

@@ -193,12 +193,11 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() > 0) continue;
         const Object& object = scene.objects[i];
-        const IceMaterial& material = *bodies[i]->material;
         Shape& shape = shapes.of(object);
         if (!(shape.area > 0.0)) continue;
         try {
-            const float spacing = point_spacing(material, shape.area, options);
-            const Rgb extinction = material.medium.sigma_s_prime + material.medium.sigma_a;
+            const float spacing = point_spacing(*bodies[i], shape.area, options);
+            const Rgb extinction = bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a;
             coarse.add(object.path, spacing, 1.0f / max_component(extinction));
             lit[i].points = shapes.points_of(object, shape, spacing, options, progress);
         } catch (const ValueError& error) {
@@ -273,11 +272,11 @@ void copy_group(const std::vector<Value>& source, std::size_t from, std::size_t 
 
 }  // namespace
 
-float point_spacing(const IceMaterial& material, double area, const RenderOptions& options) {
+float point_spacing(const Body& body, double area, const RenderOptions& options) {
     float spacing = options.spacing;
-    if (spacing == 0.0f) spacing = material.spacing.value;
+    if (spacing == 0.0f) spacing = body.material->spacing.value;
     if (spacing == 0.0f) {
-        const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
+        const Rgb sigma_t_prime = body.medium.sigma_s_prime + body.medium.sigma_a;
         const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);
         const double coarsest = std::sqrt(kPointsPerSpacing2 * area / kFewestByDefault);
         spacing = static_cast<float>(std::clamp(kDefaultSpacing / max_component(sigma_t_prime), finest, coarsest));

@@ -221,20 +221,21 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);
     std::optional<Openness> openness;
+    const bool has_overlays = layout.has("overlay");
     const auto plant = [&](const std::vector<LitPoints>& lit, const std::function<void(std::size_t)>& has_taken) {
         const double paths = double(options.width) * options.height * options.samples;
-        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
-                    {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
+        const TranslucencySets sets =
+            plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
+                        {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
+        if (has_overlays) plant_overlay_trees(scene, lit, sets, layout.overlay_of, groups.size(), bodies);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
             openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
         }
     };
-    const bool has_overlays = layout.has("overlay");
     if (baked) {
         check_bake(scene, *baked);
         plant(baked->bodies, [](std::size_t) {});
-        if (has_overlays) plant_overlay_trees(scene, baked->bodies, groups.size(), bodies);
     } else {
         Bake bake = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
         plant(bake.bodies, [&](std::size_t object) {
@@ -242,7 +243,6 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             bake.bodies[object].irradiance = {};
             bake.bodies[object].moments = {};
         });
-        if (has_overlays) plant_overlay_trees(scene, bake.bodies, groups.size(), bodies);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
