@@ -35,7 +35,8 @@ def poisson_points(
     spacing : float, (V,) array, callable or TextureSpacing
         The distance that points keep, metres, > 0. An array gives one value per vertex, linear over each triangle. A
         callable takes (N, 3) positions and returns (N,) values, each of its own position alone: it is asked for
-        thousands at once, on pieces of the mesh that are at most two spacings wide, and one where it bends. See `spacing_from_texture` and `spacing_from_camera`.
+        thousands at once, on pieces of the mesh that are at most two spacings wide, and one where it bends. See
+        `spacing_from_texture` and `spacing_from_camera`.
     seed : int
         The points depend on (mesh, spacing, seed) alone, whatever the number of threads.
     count : int, optional

@@ -75,12 +75,14 @@ def test_function_is_asked_for_thousands_at_once():
     asked = []
 
     def spacing(places):
-        assert places.dtype == np.float64 and places.shape[1:] == (3,)
+        assert places.dtype == np.float64
+        assert places.shape[1:] == (3,)
         asked.append(len(places))
         return np.full(len(places), 0.003)
 
     points = fz.poisson_points(mesh, spacing)
-    assert max(asked) >= 4096 and len(asked) < len(points) / 500
+    assert max(asked) >= 4096
+    assert len(asked) < len(points) / 500
     for threads in (1, 2):
         again = fz.poisson_points(mesh, spacing, threads=threads)
         assert again.positions.tobytes() == points.positions.tobytes()

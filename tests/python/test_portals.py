@@ -10,6 +10,7 @@ from small_scenes import placed
 from usd_stages import add_quad, load, new_stage
 
 import frazil as fz
+from frazil.content import content_hash
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 WINDOW = (0.5, 0.4)  # half width and height, in the wall at x = -2
@@ -187,3 +188,14 @@ def test_a_portal_is_refused_that_is_flat():
     dome = fz.Light(fz.DomeLight(None, "/sky", [np.diag([0.0, 1, 1, 1])]), path="/sky")
     with pytest.raises(ValueError, match="/sky: portals must be invertible"):
         fz.bake_irradiance(place, fz.RayScene([]), [dome])
+
+
+def test_a_portal_that_moves_is_other_content():
+    moved = window_portal()
+    moved[3, 1] = 0.1
+    domes = [
+        fz.Light(fz.DomeLight(None, "/sky", portals)) for portals in ([window_portal()], [window_portal()], [moved], [])
+    ]
+    first, same, *others = map(content_hash, domes)
+    assert first == same
+    assert first not in others

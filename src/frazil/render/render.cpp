@@ -11,6 +11,7 @@
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/lighting/group_balance.h"
+#include "frazil/render/buried_lights.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
@@ -215,6 +216,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     LightSampler lights(scene.lights);
+    if (!baked) stats.warnings = warnings_of_buried_lights(scene, ray_scene, lights);
     const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
     balance_groups(lights, ray_scene, receivers_in_view(scene.camera, aspect, ray_scene));
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
@@ -301,6 +303,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
 BakeResult bake_in_arena(const Scene& scene, const RenderOptions& options, Bake known, Progress* progress) {
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
+    stats.warnings = warnings_of_buried_lights(scene, ray_scene, LightSampler(scene.lights));
     const std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     Bake result = make_bake(scene, ray_scene, bodies, options, std::move(known), stats, progress);
     for (const LitPoints& lit : result.bodies) stats.points += lit.points.size();
