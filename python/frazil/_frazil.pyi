@@ -526,7 +526,7 @@ class PointTree:
 
     def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None, cells: Cells | None = None) -> None: ...
 
-    def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
+    def gather(self, positions: object, tolerance: float = 0.003000000026077032, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
         """
         Exitance and coverage at M positions (M, 3), in any order.
 

@@ -394,7 +394,8 @@ void bind_translucency(nb::module_& module) {
                 nb::gil_scoped_release release;
                 return self.gather(where.data(), where.size(), options);
             },
-            "positions"_a, "tolerance"_a = 0.01f, "estimator"_a = "noise_free", "ramp_layers"_a = false,
+            "positions"_a, "tolerance"_a = GatherOptions().tolerance, "estimator"_a = "noise_free",
+            "ramp_layers"_a = false,
             "Exitance and coverage at M positions (M, 3), in any order.\n\n"
             "Returns an object with exitance (M, G, 3) and coverage (M, 3); with ramp_layers also layers (M, K, G, 3), "
             "the\n"
