@@ -203,6 +203,8 @@ def poisson_points_constant(mesh: Mesh, spacing: float, seed: int = 0, thin_wall
 
 def poisson_points_varying(mesh: Mesh, spacing: numpy.typing.ArrayLike, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
 
+def poisson_points_sampled(mesh: Mesh, spacing: Callable, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
+
 def poisson_points_by_count(mesh: Mesh, spacing: int, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
 
 class PointStatistics:
@@ -824,7 +826,7 @@ class Light:
     shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight or MeshLight.
     radiance : RGB, the product of intensity, exposure, colour and colour temperature.
     matrix : (4, 4) float64 light to world, for row vectors; None = identity.
-    path : name for messages. group : light group, '' = the default one.
+    path : name for messages. group : light group, '' or 'default' = the default one.
     normalize : divide by the light's area in square metres.
     diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.
     shaping : Shaping. shadow : ShadowRules.
@@ -901,6 +903,11 @@ class Light:
 
     @property
     def volume(self) -> float: ...
+
+    def check(self) -> None:
+        """
+        ValueError beginning with the light's path where a value of it cannot be used.
+        """
 
     def __repr__(self) -> str: ...
 

@@ -264,3 +264,14 @@ def test_a_light_inside_ice_is_named(x, side, is_buried, refraction):
     about = [str(w.message) for w in said if "/Lamp" in str(w.message)]
     expected = "/Lamp: must lie outside of ice to light its core, got a place inside /ice."
     assert [message[: len(expected)] for message in about] == ([expected] if is_buried else [])
+
+
+def test_the_default_group_has_two_names():
+    scene = ice_over_floor()
+    scene.add_light(fz.Light(fz.SphereLight(0.2), matrix=placed(-2, 3, 1), radiance=[20.0] * 3, group="default"))
+    scene.add_light(fz.Light(fz.SphereLight(0.2), matrix=placed(0, 3, 2), radiance=[20.0] * 3))
+    film = fz.render(scene, resolution=(16, 9), samples=4, bake_samples=4, spacing=0.4)
+    groups = film.additive_layers()
+    assert groups["diffuse"] == ["diffuse_default", "diffuse_key", "diffuse_sky"]
+    for name, layers in groups.items():
+        np.testing.assert_allclose(sum(film[layer] for layer in layers), film[name], rtol=1e-5, atol=1e-6)

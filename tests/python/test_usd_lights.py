@@ -169,6 +169,8 @@ def test_dome_images_that_cannot_be_used(stage, tmp_path, problem):
         ("SphereLight", "radius", 0.0, "radius must be > 0, got 0.0"),
         ("RectLight", "width", -1.0, "width must be > 0, got -1.0"),
         ("SphereLight", "intensity", float("inf"), "intensity times color must be finite"),
+        ("DiskLight", "radius", 1e38, "radius must be in [1e-09, 1e+09] metres in the world, got 1"),
+        ("CylinderLight", "length", 1e-38, "length must be in [1e-09, 1e+09] metres in the world, got 1"),
     ],
 )
 def test_lights_that_cannot_be_used_are_left_out(stage, kind, name, value, said):
@@ -187,6 +189,14 @@ def test_flattened_lights_are_left_out(stage):
     scene = load(stage)
     assert [light.path for light in scene.lights] == ["/Sun"]
     assert "/Light: its transform cannot be inverted" in scene.warnings[0]
+
+
+def test_lights_beyond_single_precision_are_left_out(stage):
+    UsdLux.DistantLight.Define(stage, "/Sun")
+    UsdLux.DiskLight.Define(stage, "/Light").AddTranslateOp().Set(Gf.Vec3d(0, 1e17, 0))
+    scene = load(stage)
+    assert [light.path for light in scene.lights] == ["/Sun"]
+    assert "/Light: must be within 1e+12 metres of the origin, got 1" in scene.warnings[0]
 
 
 def test_what_lights_do_not_support_is_named(stage):

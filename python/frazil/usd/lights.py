@@ -143,6 +143,11 @@ class LightReader:
             shaping=_read_shaping(context, prim),
             shadow=_read_shadow(context, prim),
         )
+        try:
+            light.check()
+        except ValueError as error:
+            context.warn(path, f"{str(error).removeprefix(f'{path}: ')} The light is left out.")
+            return
         self._lights.append((light, prim))
 
 
