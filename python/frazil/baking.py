@@ -80,7 +80,7 @@ def bake(
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,
-    tolerance: float = 0.003,
+    tolerance: float = 0.01,
     estimator: str = "noise_free",
     progress: Progress | None = None,
 ) -> Bake:

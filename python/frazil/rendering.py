@@ -54,7 +54,7 @@ def render(
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,
-    tolerance: float = 0.003,
+    tolerance: float = 0.01,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
     aovs: Sequence[str] = (),

@@ -51,7 +51,7 @@ def bake_command(
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
     ] = 4,
-    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.003,
+    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     progress: Annotated[
         str, typer.Option(metavar="KIND", help="bar, farm (ALF_PROGRESS lines on stdout) or none.")

@@ -92,7 +92,7 @@ def render_command(
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
     ] = 4,
-    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.003,
+    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[
         str, typer.Option(metavar="NAME", help="Of the EXR: none, rle, zip, zips, piz, pxr24, b44, b44a, dwaa, dwab.")
