@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Integral, Real
 from os import PathLike, fspath
 
 import numpy as np
@@ -72,7 +73,9 @@ def poisson_points(
         raise TypeError(f"poisson_points: mesh must be a frazil.Mesh, got {type(mesh).__name__}. Make one of arrays.")
     if (spacing is None) == (count is None):
         raise ValueError("poisson_points: spacing or count must be given, and not both. Give one of them.")
-    options = (seed, thin_walls, max_points, threads, progress)
+    if not (isinstance(seed, Integral) and 0 <= seed < 2**32):
+        raise ValueError(f"poisson_points: seed must be a whole number from 0 to 4294967295, got {seed!r}. Use 0.")
+    options = (int(seed), thin_walls, max_points, threads, progress)
     if count is not None:
         if count <= 0:
             raise ValueError(f"poisson_points: count must be > 0, got {count}. Ask for one point or more.")
@@ -82,6 +85,12 @@ def poisson_points(
     if callable(spacing):
         return _frazil.poisson_points_sampled(mesh, lambda positions, *_: spacing(positions), *options)
     if np.ndim(spacing) == 0:
+        spacing = spacing.item() if isinstance(spacing, np.ndarray) else spacing
+        if not isinstance(spacing, Real):
+            kind = type(spacing).__name__
+            raise TypeError(
+                f"poisson_points: spacing must be a number, an array or a function, got {kind}. Give metres."
+            )
         return _frazil.poisson_points_constant(mesh, spacing, *options)
     values = np.asarray(spacing)
     if values.ndim != 1:

@@ -225,6 +225,25 @@ def test_bad_spacing(spacing, message):
         fz.poisson_points(mesh, spacing)
 
 
+@pytest.mark.parametrize("spacing", ["wide", np.array(None), 1j])
+def test_spacing_of_no_known_kind(spacing):
+    with pytest.raises(TypeError, match="spacing must be a number, an array or a function"):
+        fz.poisson_points(fz.Mesh(*square(1)), spacing)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32, 0.5, "one"])
+def test_bad_seed(seed):
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        fz.poisson_points(fz.Mesh(*square(1)), 0.5, seed)
+
+
+def test_numbers_of_numpy_are_numbers():
+    mesh = fz.Mesh(*square(1))
+    expected = fz.poisson_points(mesh, 0.25, 7).positions.tobytes()
+    for spacing in (np.float32(0.25), np.float64(0.25), np.array(0.25)):
+        assert fz.poisson_points(mesh, spacing, np.int64(7)).positions.tobytes() == expected
+
+
 @pytest.mark.parametrize("count", [0, -5])
 def test_bad_count(count):
     with pytest.raises(ValueError, match="count must be > 0"):
