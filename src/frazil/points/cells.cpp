@@ -212,6 +212,8 @@ bool fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& loo
     }
     // What has no chance to be kept need not wait for the other chunks.
     if (chunk.places.size() > 2 * most_places * chunk.sums.size()) keep_first(chunk.places, most_places + 1);
+    chunk.places.shrink_to_fit();
+    chunk.sums.shrink_to_fit();
     return is_covered;
 }
 
@@ -268,8 +270,9 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
     // Chunk after chunk, so that nothing depends on threads.
     std::vector<CellSums> sums(n);
     std::vector<std::uint32_t> begins(n + 1, 0);
-    for (const Chunk& chunk : chunks) {
+    for (Chunk& chunk : chunks) {
         for (const auto& [owner, part] : chunk.sums) sums[owner].add(part);
+        chunk.sums = {};
         for (const RankedPlace& place : chunk.places) ++begins[place.owner + 1];
     }
     for (std::size_t k = 0; k < n; ++k) begins[k + 1] += begins[k];

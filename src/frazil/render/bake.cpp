@@ -22,6 +22,7 @@ constexpr double kDefaultSpacing = 0.5;
 constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
 // Places of a body that the bake keeps at once, 16 bytes each.
 constexpr std::size_t kMostPlaces = 32'000'000;
+constexpr int kFewestPlaces = 2;  // of a cell
 // Spacing over mean free path beyond which single points show.
 constexpr float kCoarse = 4.0f;
 // How much finer points may be where a texture is dark, which may be black by mistake.
@@ -231,7 +232,7 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         if (options.gather.estimator == Estimator::noise_free) {
             PointCloud& cloud = lit[i].points.cloud();
             // No more than shadow rays; fewer where points are so many that their cells are small.
-            const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), 8,
+            const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), kFewestPlaces,
                                           std::clamp(options.bake_samples, 8, 256));
             cloud.add_cells(true, [&](const PointSet& points) {
                 return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), places);
