@@ -4,9 +4,10 @@ For every scene: a cloud of 20 N points with the plain sum is the truth, the pla
 candidate has N/10 points. Errors are relative RMS over what a camera sees; flicker is the RMS change, over the mean of
 both, between two seeds of the points. Light is a sun with ray-traced shadows over a weak sky; a step on the plane.
 
-    python bench/noise_free.py [MESH ...] [--points 20000 100000] [--profile MultipleScattering]
+    python bench/noise_free.py [MESH ...] [--points 20000 100000] [--profile MultipleScattering] [--tolerance T]
 
-Without meshes: the plane alone. `sum`: light at the points. `disc`: the kernel averaged over a disc of each point's
+Without meshes: the plane alone. Truth is gathered at a tolerance of 1e-3; the rest, without `--tolerance`, at the
+default. `sum`: light at the points. `disc`: the kernel averaged over a disc of each point's
 area. `disc, mean`: the same with light averaged over the cell. `cell, point`: the kernel averaged over the cell, light
 at the points. `cell, mean`: both over the cell, without its centre of light. `cell`: with it, as renders do. A star
 marks sums divided by W/Rd_total.
@@ -23,7 +24,7 @@ import trimesh
 import frazil as fz
 
 CANDIDATES = ("sum", "disc", "disc, mean", "cell, point", "cell, mean", "cell")
-TOLERANCE = 1e-3
+TRUTH_TOLERANCE = 1e-3
 SUN = np.array([0.4, 0.7, 0.6]) / np.linalg.norm([0.4, 0.7, 0.6])
 EYE = np.array([0.2, 0.35, 0.92]) / np.linalg.norm([0.2, 0.35, 0.92])
 
@@ -43,8 +44,9 @@ def read(path: Path) -> fz.Mesh:
 class Setting:
     """A mesh, its light, and what of it is looked at. A flat one (z = 0) has a step of light, others a sun."""
 
-    def __init__(self, name: str, mesh: fz.Mesh, shading: int = 20000):
+    def __init__(self, name: str, mesh: fz.Mesh, shading: int = 20000, tolerance: float | None = None):
         self.name, self.mesh = name, mesh
+        self.tolerance = {} if tolerance is None else {"tolerance": tolerance}
         self.is_flat = not np.any(mesh.positions[:, 2])
         self.rays = fz.RayScene([mesh])
         shape = trimesh.Trimesh(mesh.positions, mesh.triangles, process=False)
@@ -69,13 +71,13 @@ class Setting:
             lit = np.maximum(0.0, normals @ SUN) * ~self.occluded(positions, normals, SUN)
         return (np.asarray(lit, float)[:, None] * [3.0, 2.7, 2.2] + [0.15, 0.2, 0.3]).astype(np.float32)
 
-    def gather(self, candidate: str, profile, count: int, seed: int, places: int = 256):
+    def gather(self, candidate: str, profile, count: int, seed: int, places: int = 256, tolerance: dict | None = None):
         points = fz.poisson_points(self.mesh, count=count, seed=seed)
         at_points = self.light(points.positions, points.normals)
 
         def gathered(light: np.ndarray, cells=None, estimator: str = "noise_free"):
-            # A tolerance so fine that the clustering's error is none of what is compared.
-            return fz.PointTree(points, light, profile, cells=cells).gather(self.shading, TOLERANCE, estimator)
+            tree = fz.PointTree(points, light, profile, cells=cells)
+            return tree.gather(self.shading, estimator=estimator, **(tolerance or self.tolerance))
 
         if candidate == "sum":
             return gathered(at_points, estimator="sum")
@@ -101,7 +103,7 @@ def rms(values: np.ndarray, truth: np.ndarray) -> float:
 
 def measure(setting: Setting, profile, count: int, candidates=CANDIDATES) -> dict[str, tuple[float, float, float]]:
     """Per candidate error, error of the sum over W/Rd_total, flicker; percent. `bar` is the plain sum at `count`."""
-    dense = setting.gather("sum", profile, 20 * count, seed=99)
+    dense = setting.gather("sum", profile, 20 * count, seed=99, tolerance={"tolerance": TRUTH_TOLERANCE})
     truth, total = dense.exitance[:, 0], profile.albedo
     found = {}
     for name in ("bar", *candidates):
@@ -121,6 +123,8 @@ def main() -> None:
     parser.add_argument("--points", type=int, nargs="+", default=[20_000])
     parser.add_argument("--profile", default="MultipleScattering")
     parser.add_argument("--scattering", type=float, default=30.0, help="1/m, for a body of 1 m (default 30)")
+    parser.add_argument("--tolerance", type=float)
+    parser.add_argument("--candidates", nargs="+", choices=CANDIDATES, default=CANDIDATES)
     options = parser.parse_args()
     scattering = options.scattering
     medium = fz.Medium(scattering, np.array([0.6, 0.15, 0.05]) * scattering / 30, eta=1.31)
@@ -129,9 +133,9 @@ def main() -> None:
     print("| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|")
     scenes = [(path.stem, read(path)) for path in options.meshes] or [("plane", plane())]
     for name, mesh in scenes:
-        setting = Setting(name, mesh)
+        setting = Setting(name, mesh, tolerance=options.tolerance)
         for count in options.points:
-            for kind, found in measure(setting, profile, count).items():
+            for kind, found in measure(setting, profile, count, options.candidates).items():
                 n = count if kind == "bar" else count // 10
                 spacing = np.sqrt(0.7 * setting.area / n) / float(medium.mean_free_path.min())
                 numbers = " | ".join(f"{value:.2f}" for value in (spacing, *found))

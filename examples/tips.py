@@ -35,7 +35,7 @@ def make_scene(compensation: str) -> fz.Scene:
     scene = fz.Scene()
     mesh = scene.add_mesh(spires(), "/spires")
     medium = fz.Medium(sigma_s_prime=25.0, sigma_a=(0.10, 0.03, 0.01), eta=1.31)
-    ice = fz.IceMaterial(medium, specular=0.0, compensation=compensation)
+    ice = fz.IceMaterial(medium, specular=0.0, refraction=0.0, compensation=compensation)
     scene.add_object("/spires", mesh, scene.add_material("/ice", ice))
     scene.add_light(fz.Light(fz.DomeLight(), radiance=[1.0, 1.0, 1.0], path="/sky"))
     matrix = np.eye(4)

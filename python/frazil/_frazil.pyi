@@ -203,6 +203,8 @@ def poisson_points_constant(mesh: Mesh, spacing: float, seed: int = 0, thin_wall
 
 def poisson_points_varying(mesh: Mesh, spacing: numpy.typing.ArrayLike, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
 
+def poisson_points_sampled(mesh: Mesh, spacing: Callable, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
+
 def poisson_points_by_count(mesh: Mesh, spacing: int, seed: int = 0, thin_walls: bool = True, max_points: int = 0, threads: int = 0, progress: Callable | None = None) -> PointSet: ...
 
 class PointStatistics:
@@ -524,7 +526,7 @@ class PointTree:
 
     def __init__(self, points: object, irradiance: object, profile: object, ramp: Ramp | None = None, cells: Cells | None = None) -> None: ...
 
-    def gather(self, positions: object, tolerance: float = 0.009999999776482582, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
+    def gather(self, positions: object, tolerance: float = 0.003000000026077032, estimator: str = 'noise_free', ramp_layers: bool = False) -> Gathered:
         """
         Exitance and coverage at M positions (M, 3), in any order.
 
@@ -559,9 +561,14 @@ class DomeLight:
     ----------
     image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a
         uniform dome. Copied.
+    portals : list of (4, 4) float64, openings that the light comes through: the unit square in x and y to
+        the world, for row vectors; light goes along its -z. They guide sampling alone.
     """
 
-    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight') -> None: ...
+    def __init__(self, image: Annotated[NDArray[numpy.float32], dict(shape=(None, None, 3), order='C', device='cpu', writable=False)] | None = None, path: str = 'DomeLight', portals: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(4, 4), order='C', device='cpu', writable=False)]] = []) -> None: ...
+
+    @property
+    def portals(self) -> list: ...
 
     @property
     def has_image(self) -> bool: ...
@@ -819,7 +826,7 @@ class Light:
     shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight or MeshLight.
     radiance : RGB, the product of intensity, exposure, colour and colour temperature.
     matrix : (4, 4) float64 light to world, for row vectors; None = identity.
-    path : name for messages. group : light group, '' = the default one.
+    path : name for messages. group : light group, '' or 'default' = the default one.
     normalize : divide by the light's area in square metres.
     diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.
     shaping : Shaping. shadow : ShadowRules.
@@ -896,6 +903,11 @@ class Light:
 
     @property
     def volume(self) -> float: ...
+
+    def check(self) -> None:
+        """
+        ValueError beginning with the light's path where a value of it cannot be used.
+        """
 
     def __repr__(self) -> str: ...
 
@@ -1440,7 +1452,7 @@ class IceMaterial:
     Ranges are checked when the scene is rendered.
     """
 
-    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, refraction_tint: Sequence[float] = [1.0, 1.0, 1.0], volume: float = 0.0, anisotropy: float = 0.0, density: Density = ..., priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 8.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
+    def __init__(self, medium: Medium, *, profile: str = 'multiple_scattering', roughness: TextureLookup | float = 0.10000000149011612, specular: float = 1.0, translucency: float = 1.0, refraction: float = 1.0, refraction_roughness: float | None = None, refraction_tint: Sequence[float] = [1.0, 1.0, 1.0], volume: float = 0.0, anisotropy: float = 0.0, density: Density = ..., priority: int = 0, overlays: Sequence[Overlay] = [], age: float = 0.5, tint: TextureLookup | Sequence[float] = [1.0, 1.0, 1.0], ramp_distances: Sequence[float] = [], ramp_colors: Sequence[Sequence[float]] = [], ramp_preserve_energy: bool = False, compensation: str = 'depth', compensation_limit: float = 100.0, compensation_strength: float = 1.0, spacing: TextureLookup | float = 0.0, normal: TextureLookup | None = None, bump: TextureLookup | float = 0.0) -> None: ...
 
     @property
     def roughness(self) -> TextureLookup | float: ...

@@ -1,8 +1,10 @@
 """`denoise_film`: Open Image Denoise on the ray-traced layers, each by itself, so that they still sum to the beauty.
 
-Model: translucency comes from points and has no noise, so it stays as it is; so do emission and background. Every other
-additive layer is denoised apart, per light group where there are groups, guided by albedo and normal; layers and beauty
-are summed anew.
+Model: translucency comes from points, so it stays as it is; so do emission and background. Every other additive layer
+is denoised apart, per light group where there are groups, guided by albedo and normal (which are taken for clean);
+layers and beauty are summed anew. Where light is seen through ice, a path gives what it does not let through to the
+core: what translucency lacks in a pixel, refraction and volume have there, as the guides do not tell. So these are
+denoised with translucency as well, and what that sum has in a pixel beyond the parts is theirs.
 Valid: where negative lights make a layer negative, its positive and its negative part are denoised apart.
 Not: animation; every frame is on its own.
 """
@@ -16,6 +18,9 @@ from .film import Film
 __all__ = ["check_denoiser", "denoise_film"]
 
 NOISELESS = ("translucency", "emission", "background")
+SEEN_THROUGH = ("refraction", "volume")
+# Of a pixel's light; with less of it the core's own detail, which the denoiser would soften, weighs more.
+MUCH_SEEN_THROUGH = 0.4
 
 
 def check_denoiser() -> Any:
@@ -50,18 +55,42 @@ def denoise_film(film: Film) -> None:
         for sign in (1.0, -1.0):
             part = np.maximum(sign * layer, 0.0)
             if part.any():
-                result += sign * oidn.denoise(part, **guides, hdr=True)
+                result += sign * oidn.denoise(part, **guides, hdr=True, clean_aux=True)
         return result
 
     additive = film.additive_layers()
-    for name, groups in additive.items():
-        if name in NOISELESS or not film[name].any():
-            continue
-        for group in groups:
-            film[group][:] = clean(film[group])
-        film[name][:] = sum(film[group] for group in groups) if groups else clean(film[name])
-    beauty = sum(film[name] for name in additive)
-    film["beauty"][:, :, :3] = beauty
+    noisy = [name for name in additive if name not in NOISELESS and film[name].any()]
+    groups = {layer.removeprefix(name) for name in noisy for layer in additive[name]} or {""}
+    for group in sorted(groups):
+        parts = {name: film[name + group] for name in noisy if name + group in film.layers}
+        core = film["translucency" + group]
+        through = [parts[name] for name in SEEN_THROUGH if name in parts and parts[name].any()]
+        noisy_sum = sum(through, np.zeros_like(core))
+        whole = clean(core + noisy_sum) if through and core.any() else None
+        for layer in parts.values():
+            layer[:] = clean(layer)
+        if whole is not None:
+            _share_out(whole - core, through, noisy_sum, core)
+    for name in noisy:
+        if additive[name]:
+            film[name][:] = sum(film[layer] for layer in additive[name])
+    film["beauty"][:, :, :3] = sum(film[name] for name in additive)
+
+
+def _share_out(seen_through: np.ndarray, parts: list[np.ndarray], noisy_sum: np.ndarray, core: np.ndarray) -> None:
+    """Let the parts sum to `seen_through`, in place, as far as light goes through the pixel and not to the core."""
+    own = sum(parts)
+    brightness = np.maximum(_brightness(own), _brightness(noisy_sum))
+    fraction = brightness / (brightness + _brightness(core) + 1e-12)
+    rest = (seen_through - own) * np.minimum(1.0, fraction / MUCH_SEEN_THROUGH)
+    shares = [_brightness(part) + 1e-12 for part in parts]
+    total = sum(shares)
+    for part, share in zip(parts, shares, strict=True):
+        part += rest * (share / total)
+
+
+def _brightness(layer: np.ndarray) -> np.ndarray:
+    return np.abs(layer).sum(axis=2, keepdims=True)
 
 
 def _guide(layer: np.ndarray, low: float) -> np.ndarray:

@@ -75,6 +75,14 @@ def _no_grid(path: Path, grid: str, names: list[str]) -> KeyError:
     return KeyError(f"{path}: has no grid '{grid}' of floats. It has {', '.join(sorted(names)) or 'none'}.")
 
 
+def _no_voxels(path: Path, grid: str) -> ValueError:
+    return ValueError(f"{path}: grid '{grid}' must have active voxels, got none.")
+
+
+def _bent(path: Path, grid: str, kind: str) -> ValueError:
+    return ValueError(f"{path}: grid '{grid}' must have an affine transform, got {kind}. Resample it.")
+
+
 def _padded_box(path: Path, grid: str, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The corner and the size of a box of voxels, one wider on each side."""
     size = np.maximum(high - low + 1, 1).astype(np.int64) + 2
@@ -87,13 +95,20 @@ def _padded_box(path: Path, grid: str, low: np.ndarray, high: np.ndarray) -> tup
 
 
 def _read_openvdb(vdb: Any, path: Path, grid: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    try:
-        names = [g.name for g in vdb.readAllGridMetadata(str(path)) if g.valueTypeName == "float"]
-        if grid not in names:
-            raise _no_grid(path, grid, names)
-        found = vdb.read(str(path), grid)
-    except (RuntimeError, ValueError) as error:
-        raise OSError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    def asked(question: Any, *values: str) -> Any:
+        try:
+            return question(str(path), *values)
+        except (RuntimeError, ValueError, LookupError, OSError, TypeError) as error:
+            raise OSError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+
+    names = [g.name for g in asked(vdb.readAllGridMetadata) if g.valueTypeName == "float"]
+    if grid not in names:
+        raise _no_grid(path, grid, names)
+    found = asked(vdb.read, grid)
+    if found.activeVoxelCount() == 0:
+        raise _no_voxels(path, grid)
+    if not found.transform.isLinear:
+        raise _bent(path, grid, found.transform.typeName)
     low, high = (np.array(corner) for corner in found.evalActiveVoxelBoundingBox())
     corner, size = _padded_box(path, grid, low, high)
     values = np.empty(size, np.float32)
@@ -129,7 +144,7 @@ def _read_tinyvdb(path: Path, grid: str) -> tuple[np.ndarray, np.ndarray, np.nda
             "such. Voxelize its tiles, or install OpenVDB's own module."
         )
     if count == 0:
-        raise ValueError(f"{path}: grid '{grid}' must have active voxels, got none.")
+        raise _no_voxels(path, grid)
     places = np.frombuffer(sparse["coords"], np.int32).reshape(-1, 3)
     corner, size = _padded_box(path, grid, places.min(0), places.max(0))
     values = np.full(size, outside, np.float32)
@@ -143,7 +158,7 @@ def _matrix(path: Path, grid: str, transform: dict[str, Any]) -> np.ndarray:
     if kind == "affine":
         return np.array(transform["matrix"], float)
     if kind not in ("uniform_scale", "uniform_scale_translate", "scale", "scale_translate"):
-        raise ValueError(f"{path}: grid '{grid}' must have an affine transform, got {kind}. Resample it.")
+        raise _bent(path, grid, kind)
     matrix = np.diag([*transform["scale"], 1.0])
     matrix[3, :3] = transform["translation"]
     return matrix

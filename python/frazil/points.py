@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Integral, Real
 from os import PathLike, fspath
 
 import numpy as np
@@ -34,8 +35,9 @@ def poisson_points(
         spacing, and moved to the mesh: so they are the same in every pose.
     spacing : float, (V,) array, callable or TextureSpacing
         The distance that points keep, metres, > 0. An array gives one value per vertex, linear over each triangle. A
-        callable takes (N, 3) positions and returns (N,) values; where it, or a texture, bends inside a triangle it is
-        sampled finer. See `spacing_from_texture` and `spacing_from_camera`.
+        callable takes (N, 3) positions and returns (N,) values, each of its own position alone: it is asked for
+        thousands at once, on pieces of the mesh that are at most two spacings wide, and one where it bends. See
+        `spacing_from_texture` and `spacing_from_camera`.
     seed : int
         The points depend on (mesh, spacing, seed) alone, whatever the number of threads.
     count : int, optional
@@ -71,16 +73,24 @@ def poisson_points(
         raise TypeError(f"poisson_points: mesh must be a frazil.Mesh, got {type(mesh).__name__}. Make one of arrays.")
     if (spacing is None) == (count is None):
         raise ValueError("poisson_points: spacing or count must be given, and not both. Give one of them.")
-    options = (seed, thin_walls, max_points, threads, progress)
+    if not (isinstance(seed, Integral) and 0 <= seed < 2**32):
+        raise ValueError(f"poisson_points: seed must be a whole number from 0 to 4294967295, got {seed!r}. Use 0.")
+    options = (int(seed), thin_walls, max_points, threads, progress)
     if count is not None:
         if count <= 0:
             raise ValueError(f"poisson_points: count must be > 0, got {count}. Ask for one point or more.")
         return _frazil.poisson_points_by_count(mesh, count, *options)
     if isinstance(spacing, TextureSpacing):
-        return _points_from_function(mesh, spacing.on(mesh), options)
+        return _frazil.poisson_points_sampled(mesh, spacing.on(mesh), *options)
     if callable(spacing):
-        return _points_from_function(mesh, lambda places, *_: spacing(places), options)
+        return _frazil.poisson_points_sampled(mesh, lambda positions, *_: spacing(positions), *options)
     if np.ndim(spacing) == 0:
+        spacing = spacing.item() if isinstance(spacing, np.ndarray) else spacing
+        if not isinstance(spacing, Real):
+            kind = type(spacing).__name__
+            raise TypeError(
+                f"poisson_points: spacing must be a number, an array or a function, got {kind}. Give metres."
+            )
         return _frazil.poisson_points_constant(mesh, spacing, *options)
     values = np.asarray(spacing)
     if values.ndim != 1:
@@ -111,11 +121,17 @@ class TextureSpacing:
         return self.low + (self.high - self.low) * np.clip(above * (1 - fy) + below * fy, 0, 1)
 
     def on(self, mesh: Mesh) -> Callable:
-        """Spacing on the mesh by its texture coordinates, as a function of (positions, triangles, weights)."""
+        """Spacing on the mesh by its texture coordinates, as a function of (positions, triangles, barycentrics)."""
         if mesh.uvs is None:
             raise ValueError("Mesh: uvs must be given for a texture of spacing, got none. Unwrap the mesh.")
         corners = corner_uvs(mesh)
-        return lambda _, triangles, weights: self.at(np.einsum("nk,nkj->nj", weights, corners[triangles]))
+
+        def spacing(_, triangles, barycentrics):
+            a, b, c = np.moveaxis(corners[triangles], 1, 0)
+            u, v = barycentrics[:, :1], barycentrics[:, 1:]
+            return self.at(a + (b - a) * u + (c - a) * v)
+
+        return spacing
 
 
 def corner_uvs(mesh: Mesh) -> np.ndarray:
@@ -212,70 +228,3 @@ def pixel_angle(camera: Camera, resolution: tuple[int, int]) -> float:
     width, height = resolution
     aperture = max(camera.horizontal_aperture, camera.vertical_aperture * width / height)
     return aperture / camera.focal_length / width
-
-
-def _evaluate(function: Callable, places: np.ndarray, triangles: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Values (N, 3) of the function at the corners of N parts, from their places and weights in their old triangles."""
-    places, weights, triangles = places.reshape(-1, 3), weights.reshape(-1, 3), np.repeat(triangles, 3)
-    values = np.asarray(function(places, triangles, weights), np.float64)
-    if values.shape != (len(places),):
-        raise ValueError(
-            f"poisson_points: spacing(positions) must return shape ({len(places)},), got {values.shape}. "
-            "Return one value per position."
-        )
-    if not np.all(np.isfinite(values) & (values > 0)):
-        bad = values[~(np.isfinite(values) & (values > 0))][0]
-        raise ValueError(f"poisson_points: spacing must be > 0 and finite, got {bad}. It is in metres.")
-    return values.reshape(-1, 3)
-
-
-def _points_from_function(mesh: Mesh, function: Callable, options: tuple) -> PointSet:
-    """Cut triangles in four until the function is near linear on each, place points, and name the old triangles."""
-    triangles = mesh.triangles
-    # The function is asked on the pose that the points are placed on.
-    places = mesh.positions if mesh.rest is None else mesh.rest
-    corners = places.astype(np.float64)[triangles]  # (F, 3, 3)
-    weights = np.broadcast_to(np.eye(3), corners.shape)  # of the corners in their old triangle
-    parents = np.arange(len(triangles))
-    done = []
-    for depth in range(12):
-        if len(parents) == 0:
-            break
-        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-        between = 0.5 * (weights + np.roll(weights, -1, axis=1))
-        at_corners = _evaluate(function, corners, parents, weights)
-        at_middles = _evaluate(function, middles, parents, between)
-        bend = np.abs(at_middles - 0.5 * (at_corners + np.roll(at_corners, -1, axis=1))) / at_middles
-        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
-        # Long triangles are sampled anyway, as a function may turn between its samples.
-        split = ((bend.max(axis=1) > 0.05) | (edges > 32 * at_corners.min(axis=1))) & (edges > at_corners.min(axis=1))
-        split &= depth < 11
-        done.append((corners[~split], weights[~split], parents[~split], at_corners[~split]))
-        c, w, p = corners[split], weights[split], parents[split]
-        cm, wm = 0.5 * (c + np.roll(c, -1, axis=1)), 0.5 * (w + np.roll(w, -1, axis=1))
-
-        def parts(x, m):
-            return np.concatenate(
-                [
-                    np.stack([x[:, 0], m[:, 0], m[:, 2]], axis=1),
-                    np.stack([m[:, 0], x[:, 1], m[:, 1]], axis=1),
-                    np.stack([m[:, 2], m[:, 1], x[:, 2]], axis=1),
-                    m,
-                ]
-            )
-
-        corners, weights, parents = parts(c, cm), parts(w, wm), np.tile(p, 4)
-    corners, weights, parents, values = (np.concatenate(x) for x in zip(*done, strict=True))
-    order = np.argsort(parents, kind="stable")
-    corners, weights, parents, values = corners[order], weights[order], parents[order], values[order]
-    refined = Mesh(
-        np.ascontiguousarray(corners.reshape(-1, 3), np.float32),
-        np.arange(3 * len(parents), dtype=np.int32).reshape(-1, 3),
-    )
-    points = _frazil.poisson_points_varying(refined, values.reshape(-1).astype(np.float32), *options)
-    part = points.triangles.copy()
-    u, v = points.barycentrics.T.astype(np.float64)
-    own = np.stack([1 - u - v, u, v], axis=1)
-    points.barycentrics[:] = np.einsum("nk,nkj->nj", own, weights[part])[:, 1:]
-    points.triangles[:] = parents[part]
-    return points if mesh.rest is None else points.on(mesh)

@@ -238,3 +238,37 @@ TEST_CASE("densities out of range are refused by name") {
     model.density.grid = grid;
     CHECK(message().find("density grid's matrix must have a finite determinant") != std::string::npos);
 }
+
+TEST_CASE("density: the mean of a grid over a body, whatever its winding, and of noise its scale") {
+    Density linear = ramp();  // 4 z + 1
+    Mesh ball = sphere(0.1f, 3);
+    for (V3f& p : ball.positions) p = p * V3f(0.7f, 1.0f, 0.5f) + V3f(1.0f, -2.0f, 0.1f);
+    CHECK(mean_density(linear, ball) == doctest::Approx(1.4).epsilon(2e-3));
+    linear.scale = 3.0f;
+    for (V3i& t : ball.triangles) std::swap(t.x, t.y);
+    CHECK(mean_density(linear, ball) == doctest::Approx(4.2).epsilon(2e-3));
+    ball.triangles.clear();
+    CHECK(mean_density(linear, ball) == 3.0f);
+    Density clouds = noise(1.0f);
+    clouds.scale = 0.5f;
+    CHECK(mean_density(clouds, sphere(0.1f, 2)) == 0.5f);
+}
+
+TEST_CASE("density: the core of a body that is so much denser all over is that of its medium times that") {
+    const auto core_of = [](const Density& density, const Rgb& sigma_s_prime, const Rgb& sigma_a) {
+        Scene scene = scene_of(sphere(1.0f, 3), ice(sigma_a, 1.31f, 0.2f, CompensationMode::depth));
+        auto& model = std::get<IceMaterial>(scene.materials[0].model);
+        model.medium.sigma_s_prime = sigma_s_prime;
+        model.density = density;
+        model.refraction = 0.0f;
+        scene.lights = {rect_above(3.0f, "")};
+        return render(scene, small()).film.layers.at("translucency").pixels;
+    };
+    const Rgb scattering(10.0f), absorption(0.5f, 0.25f, 1.0f);
+    Density twice;
+    twice.scale = 2.0f;
+    CHECK(core_of(twice, scattering, absorption) == core_of({}, scattering * 2.0f, absorption * 2.0f));
+    CHECK(core_of(twice, scattering, absorption) != core_of({}, scattering, absorption));
+    twice.absorption = 0.0f;
+    CHECK(core_of(twice, scattering, absorption) == core_of({}, scattering * 2.0f, absorption));
+}

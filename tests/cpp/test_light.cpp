@@ -42,6 +42,23 @@ std::shared_ptr<const Environment> sky_with_sun() {
     return std::make_shared<Environment>(48, 24, pixels, "/sky");
 }
 
+// Two openings that light comes through to the origin's side, overlapping from there, and one that looks away.
+std::vector<M44f> openings() {
+    M44f wide, turned, away;
+    wide.setScale(V3f(1.2f, 0.8f, 1.0f));
+    turned.setAxisAngle(V3f(1, 2, 0).normalized(), 0.5f);
+    away.setAxisAngle(V3f(1, 0, 0), kPi);
+    const auto moved = [](const M44f& m, const V3f& to) {
+        M44f move;
+        move.setTranslation(to);
+        return m * move;
+    };
+    M44f shear;
+    shear[1][0] = 0.4f;
+    return {moved(wide, {0.2f, 0.1f, 1.0f}), moved(shear * turned, {-0.5f, 0.3f, 0.7f}),
+            moved(away, {0.0f, 0.0f, 2.0f})};
+}
+
 std::shared_ptr<const LightImage> stripes() {
     std::vector<Rgb> pixels;
     for (const float value : {0.2f, 3.0f, 0.5f, 1.0f, 0.0f, -2.0f}) pixels.emplace_back(value);
@@ -71,6 +88,8 @@ std::vector<Case> cases() {
     }
     result.push_back({"wide distant", make_light(DistantLight{260.0f}), near});
     result.push_back({"uniform dome", make_light(DomeLight{}), near});
+    result.push_back({"uniform dome with portals", make_light(DomeLight{nullptr, openings()}), near});
+    result.push_back({"dome", make_light(DomeLight{sky_with_sun(), openings()}, awkward(true)), near});
     return result;
 }
 
@@ -147,6 +166,32 @@ TEST_CASE("light: intersect() finds what sample() chose, with the same density, 
         }
         CHECK(found >= 240);
     }
+}
+
+TEST_CASE("light: a dome's portals take most samples, none where they look away or are behind") {
+    M44f up;
+    up.setTranslation(V3f(0.0f, 0.0f, 1.0f));
+    const WorldLight light(make_light(DomeLight{nullptr, {up}}));
+    const auto share = [&](const V3f& position) {
+        int through = 0;
+        for (std::uint32_t i = 0; i < 1024; ++i) {
+            Sampler sampler(3, 0, i);
+            const V2f u = sampler.next_2d();
+            LightSample s;
+            light.sample(position, {&u, 1}, {&s, 1});
+            const V3f at = position + s.direction * ((1.0f - position.z) / s.direction.z);
+            through += s.direction.z * (1.0f - position.z) > 0.0f && std::abs(at.x) < 0.5f && std::abs(at.y) < 0.5f;
+        }
+        return through / 1024.0;
+    };
+    CHECK(light.has_portal_before(V3f(0.0f)));
+    CHECK(share(V3f(0.0f)) > 0.74);
+    CHECK(!light.has_portal_before(V3f(0.0f, 0.0f, 2.0f)));
+    CHECK(share(V3f(0.0f, 0.0f, 2.0f)) < 0.1);
+    M44f flat;
+    flat[0][0] = 0.0f;
+    CHECK_THROWS_WITH_AS(WorldLight(make_light(DomeLight{nullptr, {flat}})),
+                         doctest::Contains("/light: portals must be invertible"), ValueError);
 }
 
 TEST_CASE("light: nothing shines backwards, nor out of the inside of a sphere or cylinder") {

@@ -250,6 +250,53 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("light picker: shares of groups are less noisy than even ones") {
+    // Ten lamps, a group each, along a floor under a dome; the noise of what one look at the lights gives.
+    std::vector<Light> lights{make_light(DomeLight{})};
+    lights[0].radiance = Rgb(0.02f);
+    for (int i = 0; i < 10; ++i) {
+        lights.push_back(make_light(SphereLight{0.05f}, translated({0.75f * float(i) - 3.4f, 0.0f, 0.4f})));
+        lights.back().radiance = Rgb(10.0f);
+        lights.back().group = str("lamp ", i);
+    }
+    LightSampler sampler(lights);
+    std::vector<LightReceiver> receivers;
+    for (std::uint32_t i = 0; i < 400; ++i) {
+        receivers.push_back(
+            {V3f(8.0f * random_float(i, 71) - 4.0f, 2.0f * random_float(i, 72) - 1.0f, 0.0f), V3f(0, 0, 1)});
+    }
+    const auto noise_of = [&](float picks) {
+        double squares = 0.0, sum = 0.0;
+        std::vector<LightSample> samples;
+        for (std::size_t place = 0; place < receivers.size(); ++place) {
+            LightReceiver receiver = receivers[place];
+            receiver.picks = picks;
+            constexpr int kCount = 64;
+            double first = 0.0, second = 0.0;
+            for (int i = 0; i < kCount; ++i) {
+                Sampler random(7, std::uint32_t(kCount * place) + std::uint32_t(i), 0);
+                const float u_pick = random.next_1d();
+                sampler.sample(receiver, u_pick, random.next_2d(), samples);
+                double light = 0.0;
+                for (const LightSample& s : samples) {
+                    if (s.pdf > 0.0f) light += double(s.radiance.x * std::max(0.0f, s.direction.z) / s.pdf);
+                }
+                first += light / kCount, second += light * light / kCount;
+            }
+            squares += second - first * first, sum += first;
+        }
+        return std::sqrt(squares * double(receivers.size())) / sum;
+    };
+    for (const float picks : {1.0f, 3.0f}) {
+        sampler.picker(LightUse::surface).set_scales({});
+        const double even = noise_of(picks);
+        balance_groups(sampler, RayScene({}, {}), receivers);
+        const double shared = noise_of(picks);
+        MESSAGE(picks, " at a time: even ", even, ", by shares ", shared);
+        CHECK(shared < 0.8 * even);
+    }
+}
+
 TEST_CASE("crowd: a bake of many lights gives the sum of their own, and the same bits on two threads") {
     std::vector<Light> lights = swarm(400);
     IrradianceOptions options;

@@ -151,8 +151,42 @@ TEST_CASE("passages: a slab of ice takes Fresnel's share twice and what it absor
           doctest::Approx(once * std::exp(-0.05)).epsilon(1e-3));
     // In the bake.
     CHECK(irradiance_at({sun()}, 0.0f, scene).x == doctest::Approx(once * once * std::exp(-0.2)).epsilon(1e-3));
+    // A tint at both sides, and a medium that is denser the higher up.
+    Passage veiled{1.0f, 1.31f, absorption, Rgb(0.5f, 0.9f, 1.0f)};
+    veiled.dense_attenuation = Rgb(0.3f);
+    veiled.depth = [](const V3f& origin, const V3f& direction, float length) {
+        return length * (origin.z + 0.5f * length * direction.z);
+    };
+    scene.set_passages({veiled, {}});
+    const Rgb through_veil = transmittance(scene, {V3f(0.0f), V3f(0, 0, 1)});
+    CHECK(through_veil.x == doctest::Approx(once * once * 0.25 * std::exp(-0.2 - 0.3 * 4.0)).epsilon(1e-3));
+    CHECK(through_veil.y == doctest::Approx(once * once * 0.81 * std::exp(-1.0 - 0.3 * 4.0)).epsilon(1e-3));
+    CHECK(transmittance(scene, {V3f(0, 0, 2), V3f(0, 0, 1)}).z ==
+          doctest::Approx(once * std::exp(-2.0 - 0.3 * 2.5)).epsilon(1e-3));
     scene.set_passages({{1.0f, 1.31f, absorption}, {}});
     CHECK(transmittance(scene, {V3f(100, 0, 4), V3f(0, 0, 1)}) == Rgb(0.0f));
+}
+
+TEST_CASE("passages: where bodies overlap one fills the place, and there is no boundary between them") {
+    const auto slab_of = [](float from, float to) {
+        Mesh slab = square(50.0f, to);
+        const Mesh below = square(50.0f, from);
+        for (const V3f& p : below.positions) slab.positions.push_back(p);
+        slab.triangles.emplace_back(4, 6, 5);
+        slab.triangles.emplace_back(4, 7, 6);
+        return slab;
+    };
+    RayScene scene({slab_of(1.0f, 3.0f), slab_of(2.0f, 4.0f)}, {{0, M44f()}, {1, M44f()}});
+    Passage thin{1.0f, 1.31f, Rgb(0.1f)}, thick{1.0f, 1.31f, Rgb(0.4f)};
+    const double once = 1.0 - double(fresnel_dielectric(1.0f, 1.31f));
+    const auto through = [&] { return double(transmittance(scene, {V3f(0.0f), V3f(0, 0, 1)}).x) / (once * once); };
+    scene.set_passages({thin, thin});
+    CHECK(through() == doctest::Approx(std::exp(-0.3)).epsilon(1e-3));
+    scene.set_passages({thin, thick});  // the one entered first
+    CHECK(through() == doctest::Approx(std::exp(-0.1 * 2.0 - 0.4)).epsilon(1e-3));
+    thick.priority = 1;
+    scene.set_passages({thin, thick});
+    CHECK(through() == doctest::Approx(std::exp(-0.1 - 0.4 * 2.0)).epsilon(1e-3));
 }
 
 namespace {

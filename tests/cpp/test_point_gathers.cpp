@@ -3,6 +3,7 @@
 #include "frazil/points/poisson.h"
 #include "frazil/render/bodies.h"
 #include "frazil/render/point_gathers.h"
+#include "frazil/render/translucency_sets.h"
 #include "scenes.h"
 #include "shapes.h"
 

@@ -247,15 +247,39 @@ TEST_CASE("cells are only covered where all of them is near a point, and darts o
             if (!is_marked && is_inside) CHECK(distance < 1.0f);
         }
         RandomStream random{seed};
-        int tries = 50;
-        V2f hit;
-        while (throw_darts(patch, scene.candidates, cells, random, tries, hit)) {
-            ++hits;
-            const V3f there = scene.at(hit.x, hit.y);
-            CHECK((scene.near.worlds[scene.nearest(there)] - there).length() > 1.0f);
-            for (int k = 0; k < 3; ++k) {
-                const V2f a(patch.x[k], patch.y[k]), b(patch.x[(k + 1) % 3], patch.y[(k + 1) % 3]);
-                CHECK((b - a).cross(hit - a) >= -1e-6f);
+        for (int throws = 0; throws < 6; ++throws) {
+            const int count = 3 + throws;
+            const Darts darts = throw_darts(patch, scene.candidates, cells, random, count);
+            CHECK((darts.free >> count) == 0);
+            for (int lane = 0; lane < count; ++lane) {
+                const V2f at(darts.x[lane], darts.y[lane]);
+                const V3f there = scene.at(at.x, at.y);
+                const float distance = (scene.near.worlds[scene.nearest(there)] - there).length();
+                float inside = 1.0f;
+                for (int k = 0; k < patch.count; ++k) {
+                    const V2f a(patch.x[k], patch.y[k]);
+                    const V2f b(patch.x[(k + 1) % patch.count], patch.y[(k + 1) % patch.count]);
+                    inside = std::min(inside, (b - a).cross(at - a));
+                }
+                if (darts.free >> lane & 1) {
+                    ++hits;
+                    CHECK(distance > 1.0f);
+                    CHECK(inside >= -1e-6f);
+                } else {
+                    CHECK((distance < 1.0f + 1e-4f || inside < 1e-6f));
+                }
+            }
+            // Nothing changes without a point; with one more, only where it is near.
+            CHECK(free_darts(patch, scene.candidates, scene.candidates.count, darts) == darts.free);
+            if (darts.free == 0) continue;
+            const int first = std::countr_zero(darts.free);
+            const float x = darts.x[first], y = darts.y[first], s = x * x + y * y;
+            const unsigned left = free_darts(patch, {&x, &y, &s, nullptr, 1}, 0, darts);
+            for (int lane = 0; lane < count; ++lane) {
+                const float distance = (V2f(darts.x[lane], darts.y[lane]) - V2f(x, y)).length();
+                if (std::abs(distance - 1.0f) < 1e-3f) continue;
+                const bool stays = (darts.free >> lane & 1) != 0 && distance > 1.0f;
+                CHECK((left >> lane & 1) == unsigned(stays));
             }
         }
     }

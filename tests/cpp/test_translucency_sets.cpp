@@ -104,6 +104,81 @@ TEST_CASE("a sphere cut into two overlapping parts of one translucency set is on
     }
 }
 
+namespace {
+
+Overlay patches(const std::string& name, std::uint32_t seed) {
+    Overlay overlay;
+    overlay.name = name;
+    overlay.color = Rgb(0.6f, 0.8f, 0.9f);
+    overlay.opacity = 0.6f, overlay.scattering = 0.7f, overlay.roughness = 0.4f;
+    overlay.pattern.kind = PatternKind::cells;
+    overlay.pattern.size = 0.5f, overlay.pattern.width = 0.15f, overlay.pattern.feather = 0.1f;
+    overlay.pattern.seed = seed;
+    return overlay;
+}
+
+RenderOptions with_overlay_layers() {
+    RenderOptions options = small();
+    options.bake_samples = 128;
+    options.bake_bounces = 0;
+    options.gather.tolerance = 1e-3f;
+    options.aovs = {"overlay"};
+    return options;
+}
+
+}  // namespace
+
+TEST_CASE("overlays of a set's members change its light and have their layers as on one sphere") {
+    const auto with_patches = [](Scene scene) {
+        auto& model = std::get<IceMaterial>(scene.materials[0].model);
+        model.overlays = {patches("cracks", 1), patches("frost", 7)};
+        model.age = 1.0f;
+        return scene;
+    };
+    const Film one = render(with_patches(whole(0.0f)), with_overlay_layers()).film;
+    const Film two = render(with_patches(halves("sphere", 0.0f)), with_overlay_layers()).film;
+    const Film apart = render(with_patches(halves("", 0.0f)), with_overlay_layers()).film;
+    CHECK(difference(one, two, "translucency") < 0.02);
+    for (const char* layer : {"overlay_cracks_translucency", "overlay_frost_translucency"}) {
+        REQUIRE(mean_inside(one, layer, 0) < -0.01);
+        CHECK(std::abs(difference(one, two, layer)) < 0.025);
+        CHECK(std::abs(difference(one, apart, layer)) > 0.04);
+    }
+    for (const char* layer : {"overlay_cracks_squared", "overlay_frost_diffuse"}) {
+        CHECK(std::abs(difference(one, two, layer)) < 0.04);
+    }
+}
+
+TEST_CASE("an overlay of one member has its layer on the others, as their light is its light too") {
+    const auto lower_alone = [](float opacity) {
+        Scene scene = halves("sphere", 0.0f);
+        scene.materials.push_back(scene.materials[0]);
+        auto& model = std::get<IceMaterial>(scene.materials[1].model);
+        model.overlays = {patches("frost", 7)};
+        model.overlays[0].opacity = opacity;
+        model.age = 1.0f;
+        scene.objects[1].material = 1;
+        return scene;
+    };
+    const Film full = render(lower_alone(0.6f), with_overlay_layers()).film;
+    const Film less = render(lower_alone(0.15f), with_overlay_layers()).film;
+    double error2 = 0.0, change2 = 0.0;
+    for (int y = 0; y < full.height; ++y) {
+        for (int x = 0; x < full.width; ++x) {
+            if (pixel(full, "object_id", x, y)[0] != 1.0f || pixel(full, "beauty", x, y)[3] < 1.0f) continue;
+            // Not where the other member and its frost are seen in the pixel too.
+            if (pixel(full, "overlay_frost_squared", x, y)[0] != 0.0f) continue;
+            for (int c = 0; c < 3; ++c) {
+                const double change = pixel(less, "translucency", x, y)[c] - pixel(full, "translucency", x, y)[c];
+                const double told = (0.25 - 1.0) * pixel(full, "overlay_frost_translucency", x, y)[c];
+                error2 += (change - told) * (change - told), change2 += change * change;
+            }
+        }
+    }
+    REQUIRE(change2 > 1e-4);
+    CHECK(std::sqrt(error2 / change2) < 1e-3);
+}
+
 TEST_CASE("members that cannot share their light stand for themselves, with a warning") {
     Scene scene = halves("sphere", 0.0f);
     SUBCASE("another medium") {

@@ -1,5 +1,6 @@
 """Density: grids from OpenVDB files, clouds of noise, and both from USD and MaterialX."""
 
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -9,22 +10,24 @@ from test_usd_materials import FLOAT, TOKEN, bind
 from usd_stages import add_quad, load, new_stage
 
 import frazil as fz
+from frazil import grids
 from frazil.usd.material_inputs import DENSITY_INPUTS, inputs_markdown
 
 CLOUDS = Path(__file__).parents[1] / "data" / "clouds.vdb"
 
 
-def has_openvdb():
-    for name in ("openvdb", "pyopenvdb", "tinyvdb"):
+def importable(*names):
+    for name in names:
         try:
-            __import__(name)
-            return True
+            return importlib.import_module(name)
         except ImportError:
             continue
-    return False
+    return None
 
 
-needs_openvdb = pytest.mark.skipif(not has_openvdb(), reason="no library that reads OpenVDB")
+openvdb = importable("openvdb", "pyopenvdb")
+needs_openvdb = pytest.mark.skipif(not (openvdb or importable("tinyvdb")), reason="no library that reads OpenVDB")
+needs_own_module = pytest.mark.skipif(not openvdb, reason="no Python module of OpenVDB's own")
 
 
 def cloud_frame():
@@ -68,10 +71,33 @@ def test_what_is_no_density_is_refused_by_name(tmp_path):
 
 def test_tiles_that_tinyvdb_does_not_tell_are_not_lost_in_silence():
     pytest.importorskip("tinyvdb")
-    from frazil.grids import _read_tinyvdb
-
     with pytest.raises(ValueError, match=r"'tiled' must have no constant tiles .* got 4096 voxels in such"):
-        _read_tinyvdb(CLOUDS, "tiled")
+        grids._read_tinyvdb(CLOUDS, "tiled")
+
+
+@needs_own_module
+def test_openvdb_s_own_module_reads_what_tinyvdb_reads_and_tiles():
+    pytest.importorskip("tinyvdb")
+    own, other = grids._read_openvdb(openvdb, CLOUDS, "density"), grids._read_tinyvdb(CLOUDS, "density")
+    for value, expected in zip(own, other, strict=True):
+        np.testing.assert_allclose(value, expected, atol=1e-6)
+    values = grids._read_openvdb(openvdb, CLOUDS, "tiled")[0]
+    assert values.shape == (18, 18, 18)
+    assert np.all(values[1:-1, 1:-1, 1:-1] == 2.0)
+    assert values.sum() == 2.0 * 16**3
+
+
+@needs_own_module
+def test_what_openvdb_s_own_module_cannot_turn_into_a_box_is_refused(tmp_path):
+    empty, bent = openvdb.FloatGrid(0.5), openvdb.FloatGrid(0.0)
+    empty.name, bent.name = "empty", "bent"
+    bent.copyFromArray(np.ones((4, 4, 4), np.float32))
+    bent.transform = openvdb.createFrustumTransform((0, 0, 0), (8, 8, 8), 0.5, 10.0)
+    openvdb.write(str(tmp_path / "odd.vdb"), grids=[empty, bent])
+    with pytest.raises(ValueError, match=r"odd.vdb: grid 'empty' must have active voxels, got none"):
+        grids._read_openvdb(openvdb, tmp_path / "odd.vdb", "empty")
+    with pytest.raises(ValueError, match=r"odd.vdb: grid 'bent' must have an affine transform, got NonlinearFrustum"):
+        grids._read_openvdb(openvdb, tmp_path / "odd.vdb", "bent")
 
 
 def test_depth_is_the_integral_of_eval():

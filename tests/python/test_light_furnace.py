@@ -1,5 +1,7 @@
 """What all lights keep together: a furnace of any mix is one picture, twins cancel, occlusion is what is open."""
 
+import warnings
+
 import numpy as np
 import pytest
 import trimesh
@@ -241,3 +243,35 @@ def test_occlusion_and_bent_normal_below_a_roof(kind):
     assert abs(bent[:, 2].mean()) < 0.05
     plain = fz.render(scene, resolution=(16, 9), samples=1, spacing=0.2, bake_samples=1)
     assert "occlusion" not in list(plain)
+
+
+@pytest.mark.parametrize(
+    ("x", "side", "is_buried"), [(0.0, 1, True), (0.0, -1, True), (0.95, 1, False), (1.4, 1, False)]
+)
+@pytest.mark.parametrize("refraction", [0.0, 1.0])
+def test_a_light_inside_ice_is_named(x, side, is_buried, refraction):
+    """Whichever way the mesh is wound, and whether or not the ice is seen into."""
+    scene = fz.Scene()
+    ball = trimesh.creation.icosphere(3, 1.0)
+    mesh = fz.Mesh(np.asarray(ball.vertices, np.float32), np.asarray(ball.faces, np.int32)[:, ::side].copy())
+    ice = fz.IceMaterial(fz.Medium(sigma_s_prime=(8.0,) * 3, sigma_a=(0.1,) * 3), refraction=refraction)
+    scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), scene.add_material("/ice", ice), placed(3, 0, 0))
+    scene.add_light(fz.Light(fz.SphereLight(0.1), matrix=placed(3 + x, 0, 0), path="/Lamp"))
+    options = {"resolution": (8, 8), "samples": 1, "bake_samples": 4, "spacing": 0.5}
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        fz.render(scene, **options)
+    about = [str(w.message) for w in said if "/Lamp" in str(w.message)]
+    expected = "/Lamp: must lie outside of ice to light its core, got a place inside /ice."
+    assert [message[: len(expected)] for message in about] == ([expected] if is_buried else [])
+
+
+def test_the_default_group_has_two_names():
+    scene = ice_over_floor()
+    scene.add_light(fz.Light(fz.SphereLight(0.2), matrix=placed(-2, 3, 1), radiance=[20.0] * 3, group="default"))
+    scene.add_light(fz.Light(fz.SphereLight(0.2), matrix=placed(0, 3, 2), radiance=[20.0] * 3))
+    film = fz.render(scene, resolution=(16, 9), samples=4, bake_samples=4, spacing=0.4)
+    groups = film.additive_layers()
+    assert groups["diffuse"] == ["diffuse_default", "diffuse_key", "diffuse_sky"]
+    for name, layers in groups.items():
+        np.testing.assert_allclose(sum(film[layer] for layer in layers), film[name], rtol=1e-5, atol=1e-6)

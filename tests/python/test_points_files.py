@@ -188,6 +188,15 @@ def test_stats_agree_with_a_k_d_tree(tmp_path):
     assert 0.09 < float(said["largest gap"][0]) <= 0.1 + 1e-6
 
 
+@pytest.mark.parametrize("name", ["points.xyz", "points.usdz", "points"])
+def test_output_of_no_known_kind(tmp_path, name):
+    box = tmp_path / "box.stl"
+    trimesh.creation.box().export(box)
+    result = run(box, "-o", tmp_path / name, "--spacing", 0.5, "--quiet")
+    assert (result.exit_code, "must end in .ply, .usd" in " ".join(result.output.split())) == (2, True), result.output
+    assert not (tmp_path / name).exists()
+
+
 def test_bad_files(tmp_path):
     cloud = tmp_path / "cloud.ply"
     fz.poisson_points(fz.Mesh(*mesh_of(trimesh.creation.box())), 0.5).save(cloud)

@@ -70,6 +70,51 @@ def test_function_on_large_triangles():
     np.testing.assert_allclose(rebuilt, points.positions, atol=1e-6)
 
 
+def test_function_is_asked_for_thousands_at_once():
+    mesh = fz.Mesh(*square(1))
+    asked = []
+
+    def spacing(places):
+        assert places.dtype == np.float64
+        assert places.shape[1:] == (3,)
+        asked.append(len(places))
+        return np.full(len(places), 0.003)
+
+    points = fz.poisson_points(mesh, spacing)
+    assert max(asked) >= 4096
+    assert len(asked) < len(points) / 500
+    for threads in (1, 2):
+        again = fz.poisson_points(mesh, spacing, threads=threads)
+        assert again.positions.tobytes() == points.positions.tobytes()
+        assert again.triangles.tobytes() == points.triangles.tobytes()
+
+
+def test_what_a_function_raises_comes_through():
+    mesh = fz.Mesh(*mesh_of(trimesh.creation.icosphere(6)))
+
+    def broken(places):
+        raise ZeroDivisionError("of my own")
+
+    for threads in (1, 2):
+        with pytest.raises(ZeroDivisionError, match="of my own"):
+            fz.poisson_points(mesh, broken, threads=threads)
+
+
+def test_function_asks_on_the_rest_pose():
+    positions, triangles = square(4)
+    mesh = fz.Mesh(positions + np.float32([5, 0, 0]), triangles)
+    mesh.set_rest(positions)
+
+    def spacing(places):
+        assert places[:, 0].max() <= 1
+        return 0.02 + 0.05 * places[:, 0]
+
+    points = fz.poisson_points(mesh, spacing)
+    there = fz.poisson_points(fz.Mesh(positions, triangles), spacing)
+    assert points.barycentrics.tobytes() == there.barycentrics.tobytes()
+    assert points.positions[:, 0].min() >= 5
+
+
 def test_camera_spacing_grows_with_distance():
     mesh = fz.Mesh(*square(4))
     function = spacing_from_camera([-0.1, 0.5, 0.0], pixel_angle=0.05, least=0.005)
@@ -166,7 +211,11 @@ def test_count_that_no_spacing_gives():
         (np.array([1, 1, np.nan, 1]), "got nan at vertex 2"),
         (np.array([1, -1, 1, 1]), "got -1 at vertex 1"),
         (lambda places: np.zeros(len(places)), "must be > 0 and finite, got 0"),
-        (lambda places: np.ones(3), "must return shape"),
+        (lambda places: np.where(places[:, 0] > 0.5, np.nan, 1), "must be > 0 and finite, got nan on triangle"),
+        (lambda places: np.ones(3), r"must return shape .* of numbers, got \(3,\)"),
+        (lambda places: np.ones((len(places), 1)), "must return shape"),
+        (lambda places: np.full(len(places), "wide"), "must return shape"),
+        (lambda places: 0.1, "must return shape .* got <class 'float'>"),
         (None, "spacing or count must be given"),
     ],
 )
@@ -174,6 +223,25 @@ def test_bad_spacing(spacing, message):
     mesh = fz.Mesh(*square(1))
     with pytest.raises(ValueError, match=message):
         fz.poisson_points(mesh, spacing)
+
+
+@pytest.mark.parametrize("spacing", ["wide", np.array(None), 1j])
+def test_spacing_of_no_known_kind(spacing):
+    with pytest.raises(TypeError, match="spacing must be a number, an array or a function"):
+        fz.poisson_points(fz.Mesh(*square(1)), spacing)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32, 0.5, "one"])
+def test_bad_seed(seed):
+    with pytest.raises(ValueError, match="seed must be a whole number"):
+        fz.poisson_points(fz.Mesh(*square(1)), 0.5, seed)
+
+
+def test_numbers_of_numpy_are_numbers():
+    mesh = fz.Mesh(*square(1))
+    expected = fz.poisson_points(mesh, 0.25, 7).positions.tobytes()
+    for spacing in (np.float32(0.25), np.float64(0.25), np.array(0.25)):
+        assert fz.poisson_points(mesh, spacing, np.int64(7)).positions.tobytes() == expected
 
 
 @pytest.mark.parametrize("count", [0, -5])

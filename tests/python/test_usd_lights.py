@@ -169,7 +169,8 @@ def test_dome_images_that_cannot_be_used(stage, tmp_path, problem):
         ("SphereLight", "radius", 0.0, "radius must be > 0, got 0.0"),
         ("RectLight", "width", -1.0, "width must be > 0, got -1.0"),
         ("SphereLight", "intensity", float("inf"), "intensity times color must be finite"),
-        ("PortalLight", None, None, "portals only guide sampling"),
+        ("DiskLight", "radius", 1e38, "radius must be in [1e-09, 1e+09] metres in the world, got 1"),
+        ("CylinderLight", "length", 1e-38, "length must be in [1e-09, 1e+09] metres in the world, got 1"),
     ],
 )
 def test_lights_that_cannot_be_used_are_left_out(stage, kind, name, value, said):
@@ -190,14 +191,19 @@ def test_flattened_lights_are_left_out(stage):
     assert "/Light: its transform cannot be inverted" in scene.warnings[0]
 
 
+def test_lights_beyond_single_precision_are_left_out(stage):
+    UsdLux.DistantLight.Define(stage, "/Sun")
+    UsdLux.DiskLight.Define(stage, "/Light").AddTranslateOp().Set(Gf.Vec3d(0, 1e17, 0))
+    scene = load(stage)
+    assert [light.path for light in scene.lights] == ["/Sun"]
+    assert "/Light: must be within 1e+12 metres of the origin, got 1" in scene.warnings[0]
+
+
 def test_what_lights_do_not_support_is_named(stage):
     light = UsdLux.SphereLight.Define(stage, "/Light")
     light.GetPrim().CreateRelationship("light:filters").SetTargets(["/Filter"])
-    dome = UsdLux.DomeLight.Define(stage, "/Sky")
-    dome.CreatePortalsRel().SetTargets(["/Window"])
     said = load(stage).warnings
     assert "/Light: light filters are not supported. They are left out." in said
-    assert "/Sky: portals only guide sampling, and are not used. The dome shines from everywhere." in said
 
 
 IES = """IESNA:LM-63-2002
@@ -337,3 +343,34 @@ def test_lights_inside_point_instancers_are_placed(stage):
     scene = load(stage)
     assert [light.path for light in scene.lights] == ["/Points[0]/Bulb", "/Points[1]/Bulb"]
     np.testing.assert_allclose(scene.lights[1].matrix[3, :3], [1, 0, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("inputs:frazil:translucancy", "RectLight has no inputs:frazil:translucancy, which is left out. "),
+        ("frazil:lightgroup", "RectLight has no frazil:lightgroup, which is left out. "),
+        ("inputs:intensty", "RectLight has no inputs:intensty, which is left out. "),
+        ("inputs:shaping:cone:angel", "RectLight has no inputs:shaping:cone:angel, which is left out. "),
+        ("inputs:shadow:distance", "inputs:shadow:distance has no effect without ShadowAPI."),
+        ("inputs:ri:light:shadowSubset", None),
+        ("userProperties:frazil", None),
+    ],
+)
+def test_attributes_that_no_schema_knows_are_named(stage, name, expected):
+    light = UsdLux.RectLight.Define(stage, "/Light")
+    UsdLux.ShapingAPI.Apply(light.GetPrim())
+    light.GetPrim().CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(0.5)
+    nearest = {
+        "inputs:frazil:translucancy": "inputs:frazil:translucency",
+        "frazil:lightgroup": "frazil:lightGroup",
+        "inputs:intensty": "inputs:intensity",
+        "inputs:shaping:cone:angel": "inputs:shaping:cone:angle",
+    }
+    said = load(stage).warnings
+    if expected is None:
+        assert said == []
+        return
+    (warning,) = said
+    assert warning.startswith(f"/Light: {expected}")
+    assert name not in nearest or warning.endswith(f"The nearest name is {nearest[name]}.")

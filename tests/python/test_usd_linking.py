@@ -167,3 +167,16 @@ def test_emissive_materials_become_lights(stage):
     assert lights[0].shape.is_material
     assert lights[0].shape.is_two_sided
     np.testing.assert_allclose(scene.triangle_emission(lights[0].shape.object), [(1, 2, 3)] * 2)
+
+
+@pytest.mark.parametrize("name", ["light", "shadow"])
+def test_links_to_what_does_not_exist_are_named(stage, name):
+    link = link_of(stage, name)
+    link.CreateIncludeRootAttr(False)
+    link.CreateIncludesRel().SetTargets(["/World/A", "/World/B/z"])
+    scene = load(stage)
+    assert members(scene, name) == {"/World/A/x", "/World/A/y"}
+    said = (
+        f"/Light: collection {name}Link must hold prims of the stage, got /World/B/z. The nearest object is /World/B/"
+    )
+    assert [w[: len(said)] for w in scene.warnings] == [said]

@@ -72,6 +72,8 @@ def points_command(
     positive("--pixels", pixels)
     if camera is not None and mesh.suffix.lower() not in USD_SUFFIXES | {".usdz"}:
         raise misused("--camera", f"must come with a USD file, got '{mesh}'.")
+    if output.suffix.lower() not in USD_SUFFIXES | {".ply"}:
+        raise misused("-o", f"must end in .ply, .usd, .usda or .usdc, got '{output}'.")
     check_writable(output)
     surface = read_mesh(mesh, frame=frame, rest_frame=rest_frame)
     wanted = spacing

@@ -24,6 +24,7 @@ from .._frazil import (
 from ..ies import read_ies
 from .context import ReadContext, is_singular
 from .light_images import read_light_image
+from .light_names import LIGHT_GROUP, warn_of_unknown_names
 from .linking import LinkReader
 from .textures import resolve
 
@@ -48,15 +49,19 @@ class LightReader:
         self._links = links
         self._lights: list[tuple[Light, Usd.Prim | None]] = []
         self._shining: set[int] = set()  # objects that a mesh light stands for
+        self._portals: set[Sdf.Path] = set()  # that the walk has met
 
     def read(self, prim: Usd.Prim, matrix: np.ndarray, path: str) -> None:
         """The prim's light, placed by `matrix` (its frame to the world); a warning where it cannot be used."""
         kind = str(prim.GetTypeName())
-        shape = _read_shape(self._context, prim, kind)
-        if shape is None:
+        if kind == "PortalLight":
+            self._portals.add(prim.GetPath())  # read with its dome
             return
         if is_singular(matrix):
             self._context.warn(path, "its transform cannot be inverted (a scale of 0?). The light is left out.")
+            return
+        shape = _read_shape(self._context, prim, kind, matrix)
+        if shape is None:
             return
         if isinstance(shape, DomeLight | DistantLight):
             matrix = _rotation_of(matrix)
@@ -81,6 +86,8 @@ class LightReader:
 
     def add_to_scene(self) -> None:
         """Add what was read, linked, and a mesh light for every object whose material emits light."""
+        for path in sorted(self._portals - self._portals_of_domes()):
+            self._context.warn(path, "a portal guides the light of a dome that names it in its portals. None does.")
         for light, prim in self._lights:
             light.lit = self._links.lit_by(prim)
             casters = self._links.casters_of(prim)
@@ -103,15 +110,23 @@ class LightReader:
             )
             self._scene.add_light(Light(shape, matrix=item.matrix, path=item.path))
 
+    def _portals_of_domes(self) -> set[Sdf.Path]:
+        found: set[Sdf.Path] = set()
+        for _, prim in self._lights:
+            relationship = prim.GetRelationship("portals")
+            found.update(relationship.GetForwardedTargets() if relationship else ())
+        return found
+
     def _add(self, prim: Usd.Prim, shape, matrix: np.ndarray, path: str) -> None:
         context = self._context
         _warn_of_unsupported(context, prim)
+        warn_of_unknown_names(context, prim)
         radiance = _read_radiance(context, prim)
         if not np.isfinite(radiance).all():
             context.warn(path, f"intensity times color must be finite, got {radiance.tolist()}. The light is left out.")
             return
-        group = context.get(prim.GetAttribute("frazil:lightGroup")) or context.get(
-            prim.GetAttribute("inputs:frazil:lightGroup"), ""
+        group = context.get(prim.GetAttribute(LIGHT_GROUP)) or context.get(
+            prim.GetAttribute(f"inputs:{LIGHT_GROUP}"), ""
         )
         light = Light(
             shape,
@@ -128,6 +143,11 @@ class LightReader:
             shaping=_read_shaping(context, prim),
             shadow=_read_shadow(context, prim),
         )
+        try:
+            light.check()
+        except ValueError as error:
+            context.warn(path, f"{str(error).removeprefix(f'{path}: ')} The light is left out.")
+            return
         self._lights.append((light, prim))
 
 
@@ -153,9 +173,9 @@ def _number(context: ReadContext, prim: Usd.Prim, name: str, default: float) -> 
     return float(value)
 
 
-def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
+def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str, matrix: np.ndarray):
     if kind in ("DomeLight", "DomeLight_1"):
-        return _read_dome(context, prim)
+        return _read_dome(context, prim, matrix)
     if kind == "DistantLight":
         angle = _number(context, prim, "angle", 0.53)
         if not 0.0 <= angle <= 360.0:
@@ -168,9 +188,6 @@ def _read_shape(context: ReadContext, prim: Usd.Prim, kind: str):
         "SphereLight": (("radius", 0.5),),
         "CylinderLight": (("length", 1.0), ("radius", 0.5)),
     }.get(kind)
-    if kind == "PortalLight":
-        context.warn(prim.GetPath(), "portals only guide sampling, and are not used. It is left out.")
-        return None
     if sizes is None:
         context.warn(prim.GetPath(), f"lights of type {kind or 'none'} are not supported. It is left out.")
         return None
@@ -208,13 +225,36 @@ def _read_image(context: ReadContext, prim: Usd.Prim, instead: str) -> np.ndarra
     return read_light_image(context, prim, attribute, asset, instead)
 
 
-def _read_dome(context: ReadContext, prim: Usd.Prim) -> DomeLight:
+def _read_dome(context: ReadContext, prim: Usd.Prim, matrix: np.ndarray) -> DomeLight:
     layout = str(_get(context, prim, "texture:format", "automatic"))
-    if layout not in ("automatic", "latlong"):
+    pixels = None
+    if layout in ("automatic", "latlong"):
+        pixels = _read_image(context, prim, "A uniform dome is used.")
+    else:
         context.warn(prim.GetPath(), f"dome images must be latlong, got '{layout}'. A uniform dome is used.")
-        return DomeLight()
-    pixels = _read_image(context, prim, "A uniform dome is used.")
-    return DomeLight() if pixels is None else DomeLight(pixels, str(prim.GetPath()))
+    return DomeLight(pixels, str(prim.GetPath()), _read_portals(context, prim, matrix))
+
+
+def _read_portals(context: ReadContext, dome: Usd.Prim, matrix: np.ndarray) -> list[np.ndarray]:
+    """The unit square of each of a dome's portals to the world; `matrix` places the dome."""
+    portals = []
+    relationship = dome.GetRelationship("portals")
+    for path in relationship.GetForwardedTargets() if relationship else ():
+        prim = context.stage.GetPrimAtPath(path)
+        if not prim or prim.GetTypeName() != "PortalLight":
+            context.warn(dome.GetPath(), f"portals must be PortalLight prims, got {path}. It is left out.")
+            continue
+        if UsdGeom.Imageable(prim).ComputeVisibility(context.time) == UsdGeom.Tokens.invisible:
+            continue
+        size = [_number(context, prim, name, 1.0) for name in ("width", "height")]
+        # Where an instance holds both, it moves them together.
+        to_dome = context.local_to_world(prim) @ np.linalg.inv(context.local_to_world(dome))
+        portal = np.diag([*size, 1.0, 1.0]) @ to_dome @ matrix
+        if min(size) <= 0.0 or is_singular(portal):
+            context.warn(path, f"width, height and scale must be > 0, got {size}. The portal is left out.")
+            continue
+        portals.append(np.ascontiguousarray(portal))
+    return portals
 
 
 def _read_shaping(context: ReadContext, prim: Usd.Prim) -> Shaping:
@@ -303,6 +343,3 @@ def _warn_of_unsupported(context: ReadContext, prim: Usd.Prim) -> None:
     filters = prim.GetRelationship("light:filters")
     if filters and filters.GetTargets():
         context.warn(path, "light filters are not supported. They are left out.")
-    portals = prim.GetRelationship("portals")
-    if portals and portals.GetTargets():
-        context.warn(path, "portals only guide sampling, and are not used. The dome shines from everywhere.")

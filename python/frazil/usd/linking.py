@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Sequence
 
@@ -62,6 +63,7 @@ class LinkReader:
             self._context.warn(
                 prim.GetPath(), f"collection {name} must be valid, got: {said} What it does hold counts."
             )
+        self._warn_of_missing(prim, collection, name)
         query = collection.ComputeMembershipQuery()
         rules = query.GetAsPathExpansionRuleMap()
         if not rules:
@@ -76,6 +78,17 @@ class LinkReader:
             }
             self._known[key] = self._set_of(holds)
         return self._known[key]
+
+    def _warn_of_missing(self, prim: Usd.Prim, collection: Usd.CollectionAPI, name: str) -> None:
+        for relationship in (collection.GetIncludesRel(), collection.GetExcludesRel()):
+            for path in relationship.GetTargets() if relationship else ():
+                if not self._context.stage.GetObjectAtPath(path):
+                    known = [str(own) for candidates in self._objects for own in candidates]
+                    nearest = difflib.get_close_matches(str(path), known, n=1, cutoff=0.0)
+                    hint = f" The nearest object is {nearest[0]}." if nearest else ""
+                    self._context.warn(
+                        prim.GetPath(), f"collection {name} must hold prims of the stage, got {path}.{hint}"
+                    )
 
     def _by_expression(self, collection: Usd.CollectionAPI, query) -> ObjectSet | None:
         """A collection without rules: a path expression, or nothing at all."""

@@ -134,7 +134,7 @@ ICE_INPUTS: tuple[MaterialInput, ...] = (
         choices=("off", "ratio", "conserve", "depth", "fill", "linear"),
         meaning="area compensation at tips, edges and thin parts",
     ),
-    MaterialInput("compensation_limit", "float", 8.0, 1.0, meaning="largest gain"),
+    MaterialInput("compensation_limit", "float", 100.0, 1.0, meaning="largest gain"),
     MaterialInput("compensation_strength", "float", 1.0, 0.0, 1.0, meaning="0 = off, 1 = full"),
     MaterialInput(
         "spacing",

@@ -20,14 +20,6 @@ PointSet to_points(const nb::object& points) {
     return result;
 }
 
-// A numpy array that owns `values`.
-template <class T, class Element>
-nb::object to_array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
-    auto* memory = new std::vector<T>(std::move(values));
-    nb::capsule owner(memory, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, Element>(reinterpret_cast<Element*>(memory->data()), shape, owner));
-}
-
 std::vector<Placement> one_each(std::size_t count) {
     std::vector<Placement> placements(count);
     for (std::uint32_t i = 0; i < count; ++i) placements[i].mesh = i;
@@ -70,7 +62,7 @@ void bind_lighting(nb::module_& module) {
                     });
                 }
                 const std::size_t count = result.size();
-                return to_array<std::uint8_t, bool>(std::move(result), {count});
+                return array_of<bool>(std::move(result), {count});
             },
             "origins"_a, "directions"_a, "t_max"_a = std::numeric_limits<float>::infinity(),
             "Whether anything lies on each ray: (M,) bool for origins and directions (M, 3).");
@@ -100,9 +92,9 @@ void bind_lighting(nb::module_& module) {
                 baked = bake_irradiance(set, scene, sampler, transmittance, options);
             }
             const std::size_t groups = baked->groups;
-            nb::object values = to_array<Rgb, float>(std::move(baked->values), {set.size(), groups, 3});
+            nb::object values = array_of<float>(std::move(baked->values), {set.size(), groups, 3});
             if (!return_error) return values;
-            return nb::make_tuple(values, to_array<float, float>(std::move(baked->errors), {set.size()}));
+            return nb::make_tuple(values, array_of<float>(std::move(baked->errors), {set.size()}));
         },
         "points"_a, "scene"_a, "lights"_a, nb::kw_only(), "eta"_a = 1.31f, "roughness"_a = 0.0f, "samples"_a = 64,
         "seed"_a = 0, "error"_a = 0.0f, "max_rounds"_a = 16, "objects"_a = nb::none(), "return_error"_a = false,
@@ -131,8 +123,8 @@ void bind_lighting(nb::module_& module) {
 
     const auto occlusion_arrays = [](Occlusion&& occlusion) {
         const std::size_t count = occlusion.openness.size();
-        return nb::make_tuple(to_array<float, float>(std::move(occlusion.openness), {count}),
-                              to_array<V3f, float>(std::move(occlusion.bent_normals), {count, 3}));
+        return nb::make_tuple(array_of<float>(std::move(occlusion.openness), {count}),
+                              array_of<float>(std::move(occlusion.bent_normals), {count, 3}));
     };
     module.def(
         "bake_occlusion",

@@ -38,6 +38,11 @@ nb::object image_of(nb::handle self) {
         view(&image.pixels().data()->x, {std::size_t(image.height()), std::size_t(image.width()), 3}, self));
 }
 
+// The default group goes by no name inside; its layers are called `default`.
+std::string group_named(const std::string& name) {
+    return name == "default" ? std::string() : name;
+}
+
 }  // namespace
 
 void bind_lights(nb::module_& module) {
@@ -46,13 +51,24 @@ void bind_lights(nb::module_& module) {
         "Light from all around.\n\n"
         "Parameters\n----------\n"
         "image : (height, width, 3) float32 lat-long radiance, row 0 = +y, centre = +z, or None for a\n"
-        "    uniform dome. Copied.")
+        "    uniform dome. Copied.\n"
+        "portals : list of (4, 4) float64, openings that the light comes through: the unit square in x and y to\n"
+        "    the world, for row vectors; light goes along its -z. They guide sampling alone.")
         .def(
             "__init__",
-            [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path) {
-                new (self) DomeLight{to_image<Environment>(image, path)};
+            [](DomeLight* self, const std::optional<ImageArray>& image, const std::string& path,
+               const std::vector<MatrixArray>& portals) {
+                DomeLight light{to_image<Environment>(image, path)};
+                for (const MatrixArray& portal : portals) light.portals.push_back(to_matrix(portal));
+                new (self) DomeLight(std::move(light));
             },
-            "image"_a = nb::none(), "path"_a = "DomeLight")
+            "image"_a = nb::none(), "path"_a = "DomeLight", "portals"_a = std::vector<MatrixArray>())
+        .def_prop_ro("portals",
+                     [](const DomeLight& light) {
+                         nb::list matrices;
+                         for (const M44f& portal : light.portals) matrices.append(from_matrix(portal));
+                         return matrices;
+                     })
         .def_prop_ro("has_image", [](const DomeLight& light) { return light.image != nullptr; })
         .def_prop_ro(
             "image", [](nb::handle self) { return image_of<DomeLight>(self); }, "(height, width, 3) float32, or None.")
@@ -251,7 +267,7 @@ void bind_lights(nb::module_& module) {
         "shape : DomeLight, DistantLight, RectLight, DiskLight, SphereLight, CylinderLight or MeshLight.\n"
         "radiance : RGB, the product of intensity, exposure, colour and colour temperature.\n"
         "matrix : (4, 4) float64 light to world, for row vectors; None = identity.\n"
-        "path : name for messages. group : light group, '' = the default one.\n"
+        "path : name for messages. group : light group, '' or 'default' = the default one.\n"
         "normalize : divide by the light's area in square metres.\n"
         "diffuse, specular, translucency, refraction, volume : multipliers of what the light does to each component.\n"
         "shaping : Shaping. shadow : ShadowRules.\n"
@@ -263,7 +279,7 @@ void bind_lights(nb::module_& module) {
                float translucency, float refraction, float volume, const Shaping& shaping, const ShadowRules& shadow,
                std::shared_ptr<const ObjectSet> lit) {
                 new (self) Light{path,
-                                 group,
+                                 group_named(group),
                                  std::move(shape),
                                  Rgb(radiance[0], radiance[1], radiance[2]),
                                  normalize,
@@ -278,7 +294,9 @@ void bind_lights(nb::module_& module) {
             "refraction"_a = 1.0f, "volume"_a = 1.0f, "shaping"_a = Shaping(), "shadow"_a = ShadowRules(),
             "lit"_a = nb::none())
         .def_rw("path", &Light::path)
-        .def_rw("group", &Light::group)
+        .def_prop_rw(
+            "group", [](const Light& light) { return light.group; },
+            [](Light& light, const std::string& name) { light.group = group_named(name); })
         .def_rw("shape", &Light::shape)
         .def_prop_rw(
             "radiance",
@@ -302,6 +320,7 @@ void bind_lights(nb::module_& module) {
         .def_prop_ro("refraction",
                      [](const Light& light) { return light.multipliers[int(LightComponent::refraction)]; })
         .def_prop_ro("volume", [](const Light& light) { return light.multipliers[int(LightComponent::volume)]; })
+        .def("check", &check_light, "ValueError beginning with the light's path where a value of it cannot be used.")
         .def("__repr__", [](const Light& light) {
             constexpr const char* kShapes[] = {"dome", "distant", "rect", "disk", "sphere", "cylinder", "mesh"};
             return str("Light(", light.path, ", ", kShapes[light.shape.index()], ", radiance=(", light.radiance.x, ", ",

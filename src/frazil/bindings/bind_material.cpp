@@ -288,7 +288,7 @@ void bind_ice(nb::module_& module) {
         "refraction_tint"_a = Triple{1, 1, 1}, "volume"_a = 0.0f, "anisotropy"_a = 0.0f, "density"_a = Density(),
         "priority"_a = 0, "overlays"_a = std::vector<Overlay>(), "age"_a = 0.5f, "tint"_a = ColorInput(Triple{1, 1, 1}),
         "ramp_distances"_a = std::vector<float>(), "ramp_colors"_a = std::vector<Triple>(),
-        "ramp_preserve_energy"_a = false, "compensation"_a = "depth", "compensation_limit"_a = 8.0f,
+        "ramp_preserve_energy"_a = false, "compensation"_a = "depth", "compensation_limit"_a = Compensation().limit,
         "compensation_strength"_a = 1.0f, "spacing"_a = FloatInput(0.0f), "normal"_a = nb::none(),
         "bump"_a = FloatInput(0.0f));
     def_input(cls, "roughness", &IceMaterial::roughness);

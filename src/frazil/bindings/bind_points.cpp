@@ -3,6 +3,7 @@
 #include "frazil/points/point_file.h"
 #include "frazil/points/poisson.h"
 #include "frazil/points/pose.h"
+#include "frazil/points/sampled_spacing.h"
 #include "frazil/points/statistics.h"
 #include "frazil/points/tessellated.h"
 
@@ -31,6 +32,38 @@ Progress make_progress(const std::optional<nb::callable>& report) {
         };
     }
     return Progress(call, interrupt_check());
+}
+
+// A function of (positions, triangles, barycentrics) as numpy arrays, which returns as many values. Held by whoever calls
+// it, so that no thread touches its references.
+SpacingFunction spacing_of_arrays(const Mesh& mesh, const nb::callable& function) {
+    return [&mesh, &function](std::span<const SpacingPlace> places, std::span<float> spacings) {
+        const std::size_t count = places.size();
+        std::vector<double> positions(3 * count);
+        std::vector<std::int32_t> triangles(count);
+        std::vector<float> barycentrics(2 * count);
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto& [triangle, uv] = places[i];
+            const V3i& t = mesh.triangles[triangle];
+            const V3d a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
+            const V3d position = a + (b - a) * double(uv.x) + (c - a) * double(uv.y);
+            for (int k = 0; k < 3; ++k) positions[3 * i + k] = position[k];
+            triangles[i] = static_cast<std::int32_t>(triangle);
+            barycentrics[2 * i] = uv.x;
+            barycentrics[2 * i + 1] = uv.y;
+        }
+        const nb::gil_scoped_acquire gil;
+        const nb::object result = function(array_of<double>(std::move(positions), {count, 3}),
+                                           array_of<std::int32_t>(std::move(triangles), {count}),
+                                           array_of<float>(std::move(barycentrics), {count, 2}));
+        FloatArray values;
+        if (!nb::try_cast(result, values) || values.ndim() != 1 || values.size() != count) {
+            throw ValueError(str("poisson_points: spacing(positions) must return shape (", count, ",) of numbers, got ",
+                                 nb::cast<std::string>(nb::str(nb::getattr(result, "shape", result.type()))),
+                                 ". Return one value per position."));
+        }
+        std::copy(values.data(), values.data() + count, spacings.begin());
+    };
 }
 
 }  // namespace
@@ -117,6 +150,17 @@ void bind_points(nb::module_& module) {
         return with_threads(threads, [&] {
             return place_in_rest(mesh, thin_walls, [&](const Mesh& rest) {
                 return poisson_points(rest, values, {seed, thin_walls, max_points}, &told);
+            });
+        });
+    });
+    place("poisson_points_sampled", [](const Mesh& mesh, const nb::callable& spacing, std::uint32_t seed,
+                                       bool thin_walls, std::uint64_t max_points, int threads,
+                                       const MaybeCall& progress) {
+        Progress told = make_progress(progress);
+        const nb::gil_scoped_release release;
+        return with_threads(threads, [&] {
+            return place_in_rest(mesh, thin_walls, [&](const Mesh& rest) {
+                return poisson_points(rest, spacing_of_arrays(rest, spacing), {seed, thin_walls, max_points}, &told);
             });
         });
     });

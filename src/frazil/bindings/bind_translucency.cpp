@@ -13,16 +13,8 @@
 namespace frazil {
 namespace {
 
-// Move values into a numpy array that owns them.
-template <class T>
-nb::object own(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
-    auto* kept = new std::vector<T>(std::move(values));
-    nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, float>(reinterpret_cast<float*>(kept->data()), shape, owner));
-}
-
 nb::object to_array(const Rgb& c) {
-    return own(std::vector<float>{c.x, c.y, c.z}, {3});
+    return array_of<float>(std::vector<float>{c.x, c.y, c.z}, {3});
 }
 
 // One number or three.
@@ -55,7 +47,7 @@ nb::object map_radii(nb::handle value, const char* what, const std::function<Rgb
         out.push_back(f(r));
     }
     const std::size_t n = out.size();
-    return own(std::move(out), {n, 3});
+    return array_of<float>(std::move(out), {n, 3});
 }
 
 FloatArray as_floats(nb::handle value) {
@@ -97,7 +89,7 @@ nb::object per_place(const MeshCells& self, const Value& value) {
     std::vector<V3f> out(self.cells.places.size());
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = value(self.cells.places[i], self.mesh);
     const std::size_t n = out.size();
-    return own(std::move(out), {n, 3});
+    return array_of<float>(std::move(out), {n, 3});
 }
 
 // Irradiance (N, 3) or (N, G, 3), and its G.
@@ -345,7 +337,7 @@ void bind_translucency(nb::module_& module) {
                 std::vector<float> out;
                 for (const CellPlace& place : self.cells.places) out.push_back(place.area);
                 const std::size_t n = out.size();
-                return own(std::move(out), {n});
+                return array_of<float>(std::move(out), {n});
             },
             "(M,) m²: the area that each place stands for.")
         .def_prop_ro(
@@ -402,7 +394,8 @@ void bind_translucency(nb::module_& module) {
                 nb::gil_scoped_release release;
                 return self.gather(where.data(), where.size(), options);
             },
-            "positions"_a, "tolerance"_a = 0.01f, "estimator"_a = "noise_free", "ramp_layers"_a = false,
+            "positions"_a, "tolerance"_a = GatherOptions().tolerance, "estimator"_a = "noise_free",
+            "ramp_layers"_a = false,
             "Exitance and coverage at M positions (M, 3), in any order.\n\n"
             "Returns an object with exitance (M, G, 3) and coverage (M, 3); with ramp_layers also layers (M, K, G, 3), "
             "the\n"
@@ -435,7 +428,7 @@ void bind_translucency(nb::module_& module) {
                 w = is_fill ? fill_amount(compensation, w, total) : compensation_gain(compensation, w, total);
             }
             const std::size_t n = gain.size();
-            return own(std::move(gain), {n, 3});
+            return array_of<float>(std::move(gain), {n, 3});
         },
         "coverage"_a, "profile"_a, "mode"_a = "ratio", "limit"_a = 8.0f, "strength"_a = 1.0f, "by_luminance"_a = false,
         "Gain (M, 3) that the exitance is multiplied by, from coverage (M, 3). For mode 'fill' it is the amount to "

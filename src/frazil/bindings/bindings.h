@@ -42,6 +42,14 @@ nb::ndarray<nb::numpy, T> view(T* data, std::initializer_list<std::size_t> shape
     return nb::ndarray<nb::numpy, T>(data, shape, owner);
 }
 
+// A numpy array of Elements, of which a T is one or more, that keeps the values.
+template <class Element, class T>
+nb::object array_of(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
+    auto* kept = new std::vector<T>(std::move(values));
+    const nb::capsule owner(kept, [](void* memory) noexcept { delete static_cast<std::vector<T>*>(memory); });
+    return nb::cast(nb::ndarray<nb::numpy, Element>(reinterpret_cast<Element*>(kept->data()), shape, owner));
+}
+
 // Three and two numbers, as tuples.
 using Triple = std::array<float, 3>;
 using Pair = std::array<float, 2>;

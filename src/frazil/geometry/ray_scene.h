@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -44,6 +45,19 @@ struct Passage {
     float share = 0.0f;           // of the light that enters; 0: it stops all light
     float eta = 1.0f;             // of its inside, relative to the outside
     Rgb attenuation = Rgb(0.0f);  // 1/m, inside
+    Rgb tint = Rgb(1.0f);         // of light each time that it goes through the boundary
+    int priority = 0;  // where bodies overlap the highest fills the place, the one entered first among equals
+    // Where it is denser in one place than in another: the integral of its density along a unit direction, metres, and
+    // the attenuation per metre of that, beside `attenuation`.
+    std::function<float(const V3f& origin, const V3f& direction, float length)> depth = nullptr;
+    Rgb dense_attenuation = Rgb(0.0f);
+
+    // The light that is left after a way inside.
+    Rgb along(const V3f& origin, const V3f& direction, float length) const {
+        Rgb optical_depth = attenuation * length;
+        if (depth) optical_depth += dense_attenuation * depth(origin, direction, length);
+        return exp(-optical_depth);
+    }
 };
 
 // Placements that a ray may meet, one byte each (beyond the end: 0); null = all.

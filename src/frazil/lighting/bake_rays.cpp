@@ -9,6 +9,7 @@
 namespace frazil {
 namespace {
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kCrowdSamples = 16;  // times the samples of one light
 
 // use(place, first, count) for every run of samples in order.
@@ -25,6 +26,12 @@ void for_each_place(std::size_t begin, std::size_t end, const BakeRays& rays, co
 
 const Place& place_of(std::size_t i, const BakeRays& rays) {
     return rays.places[rays.place_of[rays.order[i]]];
+}
+
+// Whether a dome has portals before any of the places.
+bool has_portal_before(const WorldLight& dome, const BakeRays& rays) {
+    return std::any_of(rays.places.begin(), rays.places.end(),
+                       [&](const Place& place) { return dome.has_portal_before(place.position); });
 }
 
 void sample_cosine(std::size_t begin, std::size_t end, BakeRays& rays) {
@@ -122,7 +129,7 @@ void RayMaker::make_rays(std::uint32_t point, const BakeTask& task, std::uint32_
                                std::span(rays.samples).subspan(first, count));
         });
         if (rays.samples.front().is_delta) one_each(world_light, rays);
-    } else if (world_light.is_uniform_dome()) {
+    } else if (world_light.is_uniform_dome() && !has_portal_before(world_light, rays)) {
         whole_.draw(seed, point, rays.u);
         spread(0, n, hash(seed, point), rays);
         sample_cosine(0, n, rays);
@@ -174,14 +181,27 @@ void RayMaker::sample_dome(const WorldLight& dome, std::uint32_t point, std::uin
     spread(0, half, hash(seed, point), rays);
     spread(half, n, hash(seed + 1, point), rays);
     sample_cosine(0, half, rays);
+    const bool has_portals = has_portal_before(dome, rays);
     for_each_place(half, n, rays, [&](const Place& place, std::size_t first, std::size_t count) {
-        dome.sample_dome(place.normal, u.subspan(first, count), samples.subspan(first, count));
+        if (has_portals) {
+            dome.sample(place.position, u.subspan(first, count), samples.subspan(first, count));
+        } else {
+            dome.sample_dome(place.normal, u.subspan(first, count), samples.subspan(first, count));
+        }
     });
     rays.directions.resize(half);
     rays.pdfs.resize(half);
     rays.radiances.resize(half);
     for (std::size_t i = 0; i < half; ++i) rays.directions[i] = samples[i].direction;
-    dome.dome_radiances(rays.directions, rays.pdfs, rays.radiances);
+    if (has_portals) {
+        for (std::size_t i = 0; i < half; ++i) {
+            LightHit hit;
+            dome.intersect(place_of(i, rays).position, rays.directions[i], kInfinity, hit);
+            rays.pdfs[i] = hit.pdf, rays.radiances[i] = hit.radiance;
+        }
+    } else {
+        dome.dome_radiances(rays.directions, rays.pdfs, rays.radiances);
+    }
     const float share = float(half) / float(n);
     for (std::size_t i = 0; i < n; ++i) {
         LightSample& sample = samples[i];

@@ -89,7 +89,7 @@ class RayMaker {
     static void spread(std::size_t begin, std::size_t end, std::uint32_t salt, BakeRays& rays);
     // A light that needs one ray alone gets one from every place, unless there are more of these than samples.
     static void one_each(const WorldLight& light, BakeRays& rays);
-    // Half of the samples by cosine, half by the image, each a net of its own, under the balance heuristic [Veach1995]:
+    // Half of the samples by cosine, half by the image (or portals), each a net of its own, under the balance heuristic [Veach1995]:
     // the density of a sample is the mean of both techniques', by their shares.
     void sample_dome(const WorldLight& dome, std::uint32_t point, std::uint32_t seed, BakeRays& rays) const;
     // Each sample picks a light of the crowd.

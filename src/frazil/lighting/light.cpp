@@ -7,10 +7,22 @@ namespace {
 
 constexpr double kPiD = 3.14159265358979323846;
 
-void check_size(const Light& light, const char* field, float value) {
-    if (std::isfinite(value) && value > 0.0f) return;
-    throw ValueError(str(light.path, ": ", field, " must be > 0 and finite, got ", value,
-                         ". A light without a surface gives no light; enlarge it or remove it."));
+// Beyond these lengths in the world single precision loses areas and cubes of distances.
+constexpr double kLeastLength = 1e-9, kMostLength = 1e9, kFarthest = 1e12;  // metres
+
+// `axes` are rows of the light's transform that the size goes along.
+void check_size(const Light& light, const char* field, float value, std::initializer_list<int> axes) {
+    if (!(std::isfinite(value) && value > 0.0f)) {
+        throw ValueError(str(light.path, ": ", field, " must be > 0 and finite, got ", value,
+                             ". A light without a surface gives no light; enlarge it or remove it."));
+    }
+    for (const int axis : axes) {
+        const float* row = light.light_to_world[axis];
+        const double length = double(value) * V3d(row[0], row[1], row[2]).length();
+        if (length >= kLeastLength && length <= kMostLength) continue;
+        throw ValueError(str(light.path, ": ", field, " must be in [", kLeastLength, ", ", kMostLength,
+                             "] metres in the world, got ", length, "."));
+    }
 }
 
 // Whether two axes are equal and at right angles, to the precision of floats.
@@ -73,22 +85,38 @@ struct SizeFactor {
     double operator()(const MeshLight& mesh) const { return surface_area(transformed(*mesh.mesh, m)); }
 };
 
+void check_transform(const Light& light, const char* field, const M44f& m) {
+    for (int i = 0; i < 4; ++i) {
+        for (int j = 0; j < 4; ++j) {
+            if (std::isfinite(m[i][j])) continue;
+            throw ValueError(str(light.path, ": ", field, " must be finite, got ", m[i][j], "."));
+        }
+    }
+    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
+    const double volume = std::abs(x.cross(y).dot(z));
+    if (volume > 1e-12 * x.length() * y.length() * z.length()) return;
+    throw ValueError(
+        str(light.path, ": ", field, " must be invertible, got determinant ", volume, ". Remove the zero scale."));
+}
+
 struct CheckShape {
     const Light& light;
-    void operator()(const DomeLight&) const {}
+    void operator()(const DomeLight& dome) const {
+        for (const M44f& portal : dome.portals) check_transform(light, "portals", portal);
+    }
     void operator()(const DistantLight& distant) const {
         if (distant.angle >= 0.0f && distant.angle <= 360.0f) return;
         throw ValueError(str(light.path, ": angle must be in [0, 360] degrees, got ", distant.angle, "."));
     }
     void operator()(const RectLight& rect) const {
-        check_size(light, "width", rect.width);
-        check_size(light, "height", rect.height);
+        check_size(light, "width", rect.width, {0});
+        check_size(light, "height", rect.height, {1});
     }
-    void operator()(const DiskLight& disk) const { check_size(light, "radius", disk.radius); }
-    void operator()(const SphereLight& sphere) const { check_size(light, "radius", sphere.radius); }
+    void operator()(const DiskLight& disk) const { check_size(light, "radius", disk.radius, {0, 1}); }
+    void operator()(const SphereLight& sphere) const { check_size(light, "radius", sphere.radius, {0, 1, 2}); }
     void operator()(const CylinderLight& cylinder) const {
-        check_size(light, "length", cylinder.length);
-        check_size(light, "radius", cylinder.radius);
+        check_size(light, "length", cylinder.length, {0});
+        check_size(light, "radius", cylinder.radius, {1, 2});
     }
     void operator()(const MeshLight& mesh) const {
         if (!mesh.mesh) throw ValueError(str(light.path, ": mesh must be given. Use the mesh that shines."));
@@ -142,22 +170,15 @@ void check_light(const Light& light) {
             throw ValueError(str(light.path, ": multipliers must be finite, got ", multiplier, "."));
         }
     }
-    for (int i = 0; i < 4; ++i) {
-        for (int j = 0; j < 4; ++j) {
-            if (!std::isfinite(light.light_to_world[i][j])) {
-                throw ValueError(str(light.path, ": transform must be finite, got ", light.light_to_world[i][j], "."));
-            }
-        }
-    }
+    check_transform(light, "transform", light.light_to_world);
     check_shaping(light);
     check_shadow(light);
     std::visit(CheckShape{light}, light.shape);
-    const M44f& m = light.light_to_world;
-    const V3d x(m[0][0], m[0][1], m[0][2]), y(m[1][0], m[1][1], m[1][2]), z(m[2][0], m[2][1], m[2][2]);
-    const double volume = std::abs(x.cross(y).dot(z));
-    if (!(volume > 1e-12 * x.length() * y.length() * z.length())) {
+    if (std::holds_alternative<DomeLight>(light.shape) || std::holds_alternative<DistantLight>(light.shape)) return;
+    const double away = V3d(light.light_to_world.translation()).length();
+    if (!(away <= kFarthest)) {
         throw ValueError(
-            str(light.path, ": transform must be invertible, got determinant ", volume, ". Remove the zero scale."));
+            str(light.path, ": must be within ", kFarthest, " metres of the origin, got ", away, ". Move it nearer."));
     }
 }
 

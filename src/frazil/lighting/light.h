@@ -7,7 +7,8 @@
 // Valid: finite values; negative radiance subtracts. Rect, disk and distant shine along -z of their frame, sphere and
 //   cylinder (about x, no caps) outwards, a mesh along the normals of its triangles; any invertible light_to_world, a
 //   dome's and a distant light's rotation alone.
-// Not: light filters, portals.
+//   Portals guide the sampling of a dome and change nothing else.
+// Not: light filters.
 #pragma once
 
 #include <memory>
@@ -26,6 +27,9 @@ namespace frazil {
 
 struct DomeLight {
     std::shared_ptr<const Environment> image;  // none = uniform
+    // Openings that its light comes through (UsdLuxPortalLight): the unit square in x and y about the origin, to the world;
+    // light goes along -z.
+    std::vector<M44f> portals = {};
 };
 struct DistantLight {
     float angle = 0.53f;  // full angle in degrees, 0 to 360; 0 = parallel

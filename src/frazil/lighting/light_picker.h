@@ -35,8 +35,6 @@ struct PickEntry {
     float scale = 1.0f;
 };
 
-inline constexpr float kBelowOne = 0.99999994f;  // the largest of numbers in [0, 1)
-
 struct LightPick {
     int light = -1;            // none
     float probability = 0.0f;  // of being among those that are chosen at a time

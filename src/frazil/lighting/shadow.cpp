@@ -33,44 +33,56 @@ void plain_factors(const RayScene& scene, std::span<const Ray> rays, std::span<R
 
 Rgb transmittance(const RayScene& scene, const Ray& ray, PlacementMask mask) {
     const std::vector<Passage>& passages = scene.passages();
-    const float end = std::min(ray.t_max, kFarAway);
     Rgb passing(1.0f);
-    // How often each body was entered without being left; what all of them take from the light by the metre.
-    std::vector<std::pair<std::uint32_t, int>> entered;
-    Rgb attenuation(0.0f);
+    // The bodies that were entered and not left, as often as they were, in their order; and the one that fills the place.
+    std::vector<std::uint32_t> entered;
+    const auto filling = [&]() -> const Passage* {
+        const Passage* best = nullptr;
+        for (const std::uint32_t body : entered) {
+            if (!best || passages[body].priority > best->priority) best = &passages[body];
+        }
+        return best;
+    };
+    const Passage* inside = nullptr;
     float t = ray.t_min;
+    const auto go_on = [&](float end) {
+        if (inside) passing *= inside->along(ray.origin + ray.direction * t, ray.direction, end - t);
+        t = end;
+    };
     Ray left = ray;
     Hit hit;
     while (true) {
         // Where nothing would be left of the light there is nothing to find.
-        const float least = std::min(attenuation.x, std::min(attenuation.y, attenuation.z));
+        const float least =
+            inside ? std::min({inside->attenuation.x, inside->attenuation.y, inside->attenuation.z}) : 0.0f;
         left.t_max = least > 0.0f ? std::min(ray.t_max, t + kNoLightDepth / least) : ray.t_max;
         if (!scene.intersect(left, hit, mask)) {
-            return left.t_max < ray.t_max ? Rgb(0.0f) : passing * exp(attenuation * (t - end));
+            if (left.t_max < ray.t_max) return Rgb(0.0f);
+            go_on(std::min(ray.t_max, kFarAway));
+            return passing;
         }
         if (hit.placement >= passages.size() || passages[hit.placement].share == 0.0f) return Rgb(0.0f);
         const Passage& passage = passages[hit.placement];
-        passing *= exp(attenuation * (t - hit.t));
-        t = hit.t;
-        // A slab reflects as much where light leaves it as where it entered, at the angle outside.
+        go_on(hit.t);
         const float facing = -hit.geometric_normal.dot(ray.direction);
-        passing *= 1.0f - fresnel_dielectric(std::min(1.0f, std::abs(facing)), passage.eta);
-        const auto known = std::find_if(entered.begin(), entered.end(),
-                                        [&](const auto& entry) { return entry.first == hit.placement; });
+        const Passage* const before = inside;
+        bool began_inside = false;
         if (facing > 0.0f) {
-            passing *= passage.share;
-            attenuation += passage.attenuation;
-            if (known == entered.end()) {
-                entered.emplace_back(hit.placement, 1);
-            } else {
-                ++known->second;
-            }
-        } else if (known != entered.end() && known->second > 0) {
-            attenuation -= passage.attenuation;
-            --known->second;
+            entered.push_back(hit.placement);
         } else {
-            // The ray began inside.
-            passing *= exp(passage.attenuation * (ray.t_min - hit.t));
+            const auto known = std::find(entered.rbegin(), entered.rend(), hit.placement);
+            began_inside = known == entered.rend();
+            if (!began_inside) entered.erase(std::next(known).base());
+        }
+        inside = filling();
+        if (began_inside) {
+            passing *= passage.along(ray.origin + ray.direction * ray.t_min, ray.direction, hit.t - ray.t_min);
+        }
+        if (began_inside || !before != !inside) {
+            // A slab reflects as much where light leaves it as where it entered, at the angle outside.
+            passing *= 1.0f - fresnel_dielectric(std::min(1.0f, std::abs(facing)), passage.eta);
+            passing *= passage.tint;
+            if (facing > 0.0f) passing *= passage.share;
         }
         if (max_component(passing) < kNoLight) return Rgb(0.0f);
         left.t_min = std::nextafter(hit.t * (1.0f + 1e-6f), std::numeric_limits<float>::infinity());

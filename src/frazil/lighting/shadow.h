@@ -1,6 +1,7 @@
 // What is left of a light along a shadow ray.
-// Model: opaque things stop it; what has a Passage lets it straight on, at the cost of Fresnel's reflection at both sides
-//   and exp(-attenuation * length) inside. UsdLuxShadowAPI: the shadow's colour, the distance within which things cast
+// Model: opaque things stop it; what has a Passage lets it straight on, at the cost of Fresnel's reflection and its tint at
+//   both sides and exp(-attenuation * length) inside. Where such bodies overlap one fills the place, and there is no
+//   boundary between them. UsdLuxShadowAPI: the shadow's colour, the distance within which things cast
 //   it and its fade; shadow linking.
 // Units: fractions.
 // Valid: thread-safe. Plain shadows of opaque things cost one occlusion ray, and packets of rays share their way.

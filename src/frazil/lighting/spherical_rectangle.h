@@ -44,6 +44,10 @@ class SphericalRectangle {
         return {x, y, z0_};
     }
 
+    double solid_angle() const {
+        return is_small_ ? -z0_ * area_ / std::pow(x0_ * x0_ + y0_ * y0_ + z0_ * z0_, 1.5) : solid_angle_;
+    }
+
     // Density per steradian of the direction to the point p of the rectangle.
     double pdf(const V3d& p) const {
         if (!is_small_) return 1.0 / solid_angle_;

@@ -38,31 +38,26 @@ class WorldLight::Builder {
         const V3f z = (row(m_, 2) - y * y.dot(row(m_, 2))).normalized();
         V3f x = y.cross(z);
         if (x.dot(row(m_, 0)) < 0.0f) x = -x;
-        return Dome{dome.image, x, y, z};
+        std::vector<Rect> portals;
+        for (const M44f& portal : dome.portals) portals.push_back(make_rect(portal, 1.0f, 1.0f, nullptr));
+        return Dome{dome.image, x, y, z, std::move(portals)};
     }
     Shape operator()(const DistantLight& distant) const {
         const double sine = std::sin(0.25 * double(distant.angle) * 3.14159265358979323846 / 180.0);
         return Distant{row(m_, 2).normalized(), static_cast<float>(2.0 * sine * sine),
                        static_cast<float>(size_factor(light_))};
     }
-    Shape operator()(const RectLight& rect) const {
-        const V3f x = row(m_, 0).normalized(), y = row(m_, 1).normalized(), normal = shining_side();
-        const float width = rect.width * row(m_, 0).length(), height = rect.height * row(m_, 1).length();
-        set_extent(0.5f * std::sqrt(width * width + height * height) * (1.0f + std::abs(x.dot(y))), 1.0f, normal);
-        const V3f half_x = x * (0.5f * width), half_y = y * (0.5f * height);
+    Shape operator()(const RectLight& light) const {
+        Rect rect = make_rect(m_, light.width, light.height, light.image);
+        set_extent(0.5f * std::sqrt(rect.width * rect.width + rect.height * rect.height) *
+                       (1.0f + std::abs(rect.x.dot(rect.y))),
+                   1.0f, rect.normal);
+        const V3f half_x = rect.x * (0.5f * rect.width), half_y = rect.y * (0.5f * rect.height);
         set_box({half_x + half_y, half_x - half_y}, false);
-        return Rect{m_.translation(),
-                    normal,
-                    x,
-                    y,
-                    width,
-                    height,
-                    from_rows(x, y, normal).inverse(),
-                    std::abs(determinant(x, y, normal)),
-                    rect.image};
+        return rect;
     }
     Shape operator()(const DiskLight& disk) const {
-        const V3f x = row(m_, 0) * disk.radius, y = row(m_, 1) * disk.radius, normal = shining_side();
+        const V3f x = row(m_, 0) * disk.radius, y = row(m_, 1) * disk.radius, normal = shining_side(m_);
         set_extent(x.length() + y.length(), 1.0f, normal);
         set_box({x, y}, true);
         return Disk{
@@ -99,10 +94,22 @@ class WorldLight::Builder {
         const double det = std::abs(V3d(x).cross(V3d(y)).dot(V3d(z)));
         return {m_.translation(), to_world, to_world.inverse(), static_cast<float>(std::cbrt(det))};
     }
-    // Unit normal of the xy plane on the side of the light's own -z.
-    V3f shining_side() const {
-        const V3f normal = row(m_, 0).cross(row(m_, 1)).normalized();
-        return normal.dot(row(m_, 2)) > 0.0f ? -normal : normal;
+    // Unit normal of the xy plane on the side of the frame's own -z.
+    static V3f shining_side(const M44f& m) {
+        const V3f normal = row(m, 0).cross(row(m, 1)).normalized();
+        return normal.dot(row(m, 2)) > 0.0f ? -normal : normal;
+    }
+    static Rect make_rect(const M44f& m, float width, float height, std::shared_ptr<const LightImage> image) {
+        const V3f x = row(m, 0).normalized(), y = row(m, 1).normalized(), normal = shining_side(m);
+        return {m.translation(),
+                normal,
+                x,
+                y,
+                width * row(m, 0).length(),
+                height * row(m, 1).length(),
+                from_rows(x, y, normal).inverse(),
+                std::abs(determinant(x, y, normal)),
+                std::move(image)};
     }
     void set_extent(float radius, float share_of_area, const V3f& normal) const {
         extent_ = {m_.translation(), radius, static_cast<float>(size_factor(light_)) * share_of_area, normal};
@@ -198,6 +205,11 @@ bool WorldLight::hit_triangle(std::uint32_t triangle, const V3f& direction, floa
 bool WorldLight::is_uniform_dome() const {
     const Dome* dome = std::get_if<Dome>(&shape_);
     return dome && !dome->image;
+}
+
+bool WorldLight::has_portal_before(const V3f& position) const {
+    const Dome* dome = std::get_if<Dome>(&shape_);
+    return dome && !dome->portals.empty() && !portals_before(*dome, position).empty();
 }
 
 Rgb WorldLight::dome_radiance(const V3f& direction) const {

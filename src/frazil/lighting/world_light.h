@@ -1,7 +1,8 @@
 // One light in world space: directions towards it with their densities, and what a ray sees of it.
 // Model: rect by its solid angle [Urena2013], sphere by its cone of directions [PBRT4, Section 12.2], disk by area,
 //   cylinder by the angle across and its length, distant uniform in its cone, dome by its image, mesh by area; a rect
-//   with an image half by its solid angle, half by the image. Sheared or unevenly scaled shapes are sampled in the frame
+//   with an image half by its solid angle, half by the image; a dome with portals before the point partly by the solid
+//   angle of these, partly as without. Sheared or unevenly scaled shapes are sampled in the frame
 //   where they are not, and the density follows the map.
 // Units: pdf per steradian.
 // Valid: any light that check_light accepts; the density of intersect() is that of sample().
@@ -11,6 +12,7 @@
 #include <limits>
 #include <span>
 #include <variant>
+#include <vector>
 
 #include "frazil/base/vec.h"
 #include "frazil/lighting/light.h"
@@ -18,6 +20,8 @@
 #include "frazil/lighting/mesh_emitter.h"
 
 namespace frazil {
+
+inline constexpr float kBelowOne = 0.99999994f;  // the largest of numbers in [0, 1)
 
 struct LightSample {
     V3f direction = V3f(0.0f);                                // unit length, from the shading point to the light
@@ -59,21 +63,19 @@ class WorldLight {
     bool is_finite() const { return !is_dome() && !std::holds_alternative<Distant>(shape_); }
 
     bool is_dome() const { return std::holds_alternative<Dome>(shape_); }
+    // Whether a dome has portals that light may come through to the position.
+    bool has_portal_before(const V3f& position) const;
     // A uniform dome: cosine-weighted directions serve it best.
     bool is_uniform_dome() const;
     // Radiance of a dome in a direction; only where is_dome().
     Rgb dome_radiance(const V3f& direction) const;
-    // sample() for a place that receives on the side of `normal`: directions from behind may come with a pdf of 0. Only
-    // for a dome with an image.
+    // sample() without portals, for a place that receives on the side of `normal`: directions from behind may come with a
+    // pdf of 0. Only for a dome with an image.
     void sample_dome(const V3f& normal, std::span<const V2f> u, std::span<LightSample> out) const;
-    // The radiances of many, with the densities of sample(); only for a dome with an image.
+    // The radiances of many, with the densities of sample_dome(); only for a dome with an image.
     void dome_radiances(std::span<const V3f> directions, std::span<float> pdfs, std::span<Rgb> radiances) const;
 
   private:
-    struct Dome {
-        std::shared_ptr<const Environment> image;
-        V3f x, y, z;  // orthonormal axes in the world
-    };
     struct Distant {
         V3f axis;    // towards the light
         float cap;   // 1 - cos(half angle); 0 = parallel
@@ -87,6 +89,13 @@ class WorldLight {
         float shear;          // |det| of (x, y, normal); 1 for a true rectangle
         std::shared_ptr<const LightImage> image;
     };
+    struct Dome {
+        std::shared_ptr<const Environment> image;
+        V3f x, y, z;  // orthonormal axes in the world
+        std::vector<Rect> portals;
+    };
+    struct RectView;    // a rect as a point sees it
+    struct PortalView;  // the same of a portal
     struct Disk {
         V3f center, normal, x, y;  // semi-axes
         float area;
@@ -117,6 +126,16 @@ class WorldLight {
     Rgb shaped(const V3f& direction) const {
         return eval(shaping_, {direction.dot(frame_[0]), direction.dot(frame_[1]), direction.dot(frame_[2])});
     }
+
+    // The portals that light may come through to the position, with their shares of what these get; until the thread's
+    // next call.
+    static const std::vector<PortalView>& portals_before(const Dome& dome, const V3f& position);
+    static float portal_pdf(const std::vector<PortalView>& portals, const V3f& direction);
+    void sample_portals(const Dome& dome, const std::vector<PortalView>& portals, std::span<const V2f> u,
+                        std::span<LightSample> out) const;
+    // Direction, radiance and density as without portals.
+    LightSample sample_whole(const Dome& dome, const V2f& u) const;
+    Rgb eval_whole(const Dome& dome, const V3f& direction, float& pdf) const;
 
     void sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u, std::span<LightSample> out) const;
     void sample_from(const Distant& distant, const V3f& position, std::span<const V2f> u,

@@ -44,17 +44,203 @@ bool enter_unit_ball(const V3f& o, const V3f& d, float& t) {
 
 }  // namespace
 
+// ---- rect ----
+
+namespace {
+
+// The rect as seen from a point, in its own frame. `at` is the point there.
+SphericalRectangle seen_from(const V3f& at, float width, float height) {
+    const double w = 0.5 * double(width), h = 0.5 * double(height);
+    return {-w - double(at.x), w - double(at.x), -h - double(at.y), h - double(at.y), double(at.z)};
+}
+
+}  // namespace
+
+// A rect as a point on the side that it shines to sees it; its directions are uniform in the solid angle of its own frame.
+struct WorldLight::RectView {
+    const Rect* rect;
+    V3f at;  // the point in that frame
+    SphericalRectangle view;
+
+    static bool is_before(const Rect& rect, const V3f& position, V3f& at) {
+        rect.world_to_local.multDirMatrix(position - rect.center, at);
+        return at.z > 0.0f;
+    }
+    // Only where is_before().
+    RectView(const Rect& r, const V3f& at_) : rect(&r), at(at_), view(seen_from(at_, r.width, r.height)) {}
+
+    V3f to_world(const V3d& local) const {
+        return rect->x * float(local.x) + rect->y * float(local.y) + rect->normal * float(local.z);
+    }
+    // Density of the direction to a place of the rect, `local` from the point, `distance` from it in the world.
+    float pdf(const V3d& local, float distance) const {
+        return float(view.pdf(local)) * cube(distance / float(local.length())) / rect->shear;
+    }
+    // Where a ray of unit direction meets the rect: distance and place. False where it misses.
+    bool meet(const V3f& direction, float& t, V3d& local) const {
+        V3f along;
+        rect->world_to_local.multDirMatrix(direction, along);
+        if (!(along.z < 0.0f)) return false;
+        t = -at.z / along.z;
+        const float x = at.x + t * along.x, y = at.y + t * along.y;
+        local = V3d(along) * double(t);
+        return std::abs(x) <= 0.5f * rect->width && std::abs(y) <= 0.5f * rect->height;
+    }
+};
+
+void WorldLight::sample_from(const Rect& rect, const V3f& position, std::span<const V2f> u,
+                             std::span<LightSample> out) const {
+    V3f at;
+    if (!RectView::is_before(rect, position, at)) return;
+    const RectView seen(rect, at);
+    for (std::size_t i = 0; i < u.size(); ++i) {
+        LightSample& sample = out[i];
+        V3d local;
+        if (rect.image && u[i].x < 0.5f) {
+            float pdf;
+            const V2f place = rect.image->sample({2.0f * u[i].x, u[i].y}, pdf);
+            local = V3d((0.5f - place.x) * rect.width - at.x, (0.5f - place.y) * rect.height - at.y, -at.z);
+        } else {
+            local = seen.view.sample(rect.image ? V2f(2.0f * u[i].x - 1.0f, u[i].y) : u[i]);
+        }
+        const V3f to_light = seen.to_world(local);
+        const float distance = to_light.length();
+        sample.direction = to_light / distance;
+        sample.distance = distance * kShadowEnd;
+        sample.radiance = radiance_;
+        sample.pdf = seen.pdf(local, distance);
+        if (rect.image) {
+            const V2f place = image_place(rect, local, at);
+            sample.radiance *= rect.image->eval(place);
+            sample.pdf = 0.5f * (sample.pdf + image_pdf(rect, place, to_light));
+        }
+    }
+}
+
+// Upright as seen from the side that shines, where +x lies to the left.
+V2f WorldLight::image_place(const Rect& rect, const V3d& local_offset, const V3f& at) const {
+    return {0.5f - (float(local_offset.x) + at.x) / rect.width, 0.5f - (float(local_offset.y) + at.y) / rect.height};
+}
+
+float WorldLight::image_pdf(const Rect& rect, const V2f& place, const V3f& to_light) const {
+    const float distance2 = to_light.length2(), facing = -to_light.dot(rect.normal);
+    return rect.image->pdf(place) * distance2 * std::sqrt(distance2) /
+           (facing * (rect.width * rect.height * rect.x.cross(rect.y).length()));
+}
+
+bool WorldLight::hit_by(const Rect& rect, const V3f& origin, const V3f& direction, LightHit& hit) const {
+    V3f at;
+    if (!RectView::is_before(rect, origin, at)) return false;
+    const RectView seen(rect, at);
+    float t;
+    V3d local;
+    if (!seen.meet(direction, t, local)) return false;
+    const float density = seen.pdf(local, t);
+    hit = {radiance_, density, t, hit.light};
+    if (rect.image) {
+        const V2f place = image_place(rect, local, at);
+        hit.radiance *= rect.image->eval(place);
+        hit.pdf = 0.5f * (density + image_pdf(rect, place, direction * t));
+    }
+    return true;
+}
+
 // ---- dome ----
 
-void WorldLight::sample_from(const Dome& dome, const V3f&, std::span<const V2f> u, std::span<LightSample> out) const {
+struct WorldLight::PortalView : RectView {
+    PortalView(const Rect& rect, const V3f& at_)
+        : RectView(rect, at_), share(std::max(float(view.solid_angle()), 1e-30f)) {}
+    float share;  // of what goes to portals: by solid angle
+};
+
+namespace {
+
+// Of a dome's samples where there are portals before the place. An image may hold a sun that only itself finds.
+constexpr float kToPortals = 0.75f, kToPortalsOfImage = 0.5f;
+
+}  // namespace
+
+const std::vector<WorldLight::PortalView>& WorldLight::portals_before(const Dome& dome, const V3f& position) {
+    thread_local std::vector<PortalView> views;
+    views.clear();
+    float total = 0.0f;
+    for (const Rect& rect : dome.portals) {
+        V3f at;
+        if (!RectView::is_before(rect, position, at)) continue;
+        views.emplace_back(rect, at);
+        total += views.back().share;
+    }
+    for (PortalView& view : views) view.share /= total;
+    return views;
+}
+
+float WorldLight::portal_pdf(const std::vector<PortalView>& portals, const V3f& direction) {
+    float pdf = 0.0f;
+    for (const PortalView& portal : portals) {
+        float t;
+        V3d local;
+        if (portal.meet(direction, t, local)) pdf += portal.share * portal.pdf(local, t);
+    }
+    return pdf;
+}
+
+LightSample WorldLight::sample_whole(const Dome& dome, const V2f& u) const {
+    LightSample sample;
+    if (dome.image) {
+        sample_dome(V3f(0.0f), {&u, 1}, {&sample, 1});
+    } else {
+        sample.direction = uniform_sphere(u);
+        sample.radiance = radiance_;
+        sample.pdf = 0.25f * kInvPi;
+    }
+    return sample;
+}
+
+Rgb WorldLight::eval_whole(const Dome& dome, const V3f& direction, float& pdf) const {
+    Rgb radiance = radiance_;
+    pdf = 0.25f * kInvPi;
+    if (dome.image) dome_radiances({&direction, 1}, {&pdf, 1}, {&radiance, 1});
+    return radiance;
+}
+
+void WorldLight::sample_from(const Dome& dome, const V3f& position, std::span<const V2f> u,
+                             std::span<LightSample> out) const {
+    if (!dome.portals.empty()) {
+        if (const auto& portals = portals_before(dome, position); !portals.empty()) {
+            sample_portals(dome, portals, u, out);
+            return;
+        }
+    }
     if (dome.image) {
         sample_dome(V3f(0.0f), u, out);
-        return;
+    } else {
+        for (std::size_t i = 0; i < u.size(); ++i) out[i] = sample_whole(dome, u[i]);
     }
+}
+
+void WorldLight::sample_portals(const Dome& dome, const std::vector<PortalView>& portals, std::span<const V2f> u,
+                                std::span<LightSample> out) const {
+    const float to_portals = dome.image ? kToPortalsOfImage : kToPortals;
     for (std::size_t i = 0; i < u.size(); ++i) {
-        out[i].direction = uniform_sphere(u[i]);
-        out[i].radiance = radiance_;
-        out[i].pdf = 0.25f * kInvPi;
+        LightSample& sample = out[i];
+        float left = u[i].x / to_portals;
+        if (left >= 1.0f) {
+            sample = sample_whole(dome, {(u[i].x - to_portals) / (1.0f - to_portals), u[i].y});
+            sample.pdf = (1.0f - to_portals) * sample.pdf + to_portals * portal_pdf(portals, sample.direction);
+            continue;
+        }
+        std::size_t chosen = 0;
+        while (chosen + 1 < portals.size() && left >= portals[chosen].share) left -= portals[chosen++].share;
+        const PortalView& portal = portals[chosen];
+        const V3d local = portal.view.sample({std::clamp(left / portal.share, 0.0f, kBelowOne), u[i].y});
+        const V3f to_portal = portal.to_world(local);
+        sample.direction = to_portal.normalized();
+        float whole;
+        sample.radiance = eval_whole(dome, sample.direction, whole);
+        // The chosen one is met for certain, whatever rounding says at its rim.
+        float pdf = portal_pdf(portals, sample.direction);
+        if (!(pdf > 0.0f)) pdf = portal.share * portal.pdf(local, to_portal.length());
+        sample.pdf = (1.0f - to_portals) * whole + to_portals * pdf;
     }
 }
 
@@ -80,14 +266,14 @@ void WorldLight::sample_dome(const V3f& normal, std::span<const V2f> u, std::spa
     }
 }
 
-bool WorldLight::hit_by(const Dome& dome, const V3f&, const V3f& direction, LightHit& hit) const {
-    hit.pdf = 0.25f * kInvPi;
-    if (dome.image) {
-        dome_radiances({&direction, 1}, {&hit.pdf, 1}, {&hit.radiance, 1});
-    } else {
-        hit.radiance = radiance_;
-    }
+bool WorldLight::hit_by(const Dome& dome, const V3f& origin, const V3f& direction, LightHit& hit) const {
+    hit.radiance = eval_whole(dome, direction, hit.pdf);
     hit.distance = kInfinity;
+    if (dome.portals.empty()) return true;
+    if (const auto& portals = portals_before(dome, origin); !portals.empty()) {
+        const float to_portals = dome.image ? kToPortalsOfImage : kToPortals;
+        hit.pdf = (1.0f - to_portals) * hit.pdf + to_portals * portal_pdf(portals, direction);
+    }
     return true;
 }
 
@@ -108,79 +294,6 @@ bool WorldLight::hit_by(const Distant& distant, const V3f&, const V3f& direction
     // 1 - cos from the chord, which keeps small angles.
     if (!(0.5f * (direction - distant.axis).length2() < distant.cap)) return false;
     hit = {radiance_, 0.5f * kInvPi / distant.cap, kInfinity, hit.light};
-    return true;
-}
-
-// ---- rect ----
-
-namespace {
-
-// The rect as seen from a point, in its own frame. `at` is the point there.
-SphericalRectangle seen_from(const V3f& at, float width, float height) {
-    const double w = 0.5 * double(width), h = 0.5 * double(height);
-    return {-w - double(at.x), w - double(at.x), -h - double(at.y), h - double(at.y), double(at.z)};
-}
-
-}  // namespace
-
-void WorldLight::sample_from(const Rect& rect, const V3f& position, std::span<const V2f> u,
-                             std::span<LightSample> out) const {
-    V3f at;
-    rect.world_to_local.multDirMatrix(position - rect.center, at);
-    if (!(at.z > 0.0f)) return;
-    const SphericalRectangle view = seen_from(at, rect.width, rect.height);
-    for (std::size_t i = 0; i < u.size(); ++i) {
-        LightSample& sample = out[i];
-        V3d local;
-        if (rect.image && u[i].x < 0.5f) {
-            float pdf;
-            const V2f place = rect.image->sample({2.0f * u[i].x, u[i].y}, pdf);
-            local = V3d((0.5f - place.x) * rect.width - at.x, (0.5f - place.y) * rect.height - at.y, -at.z);
-        } else {
-            local = view.sample(rect.image ? V2f(2.0f * u[i].x - 1.0f, u[i].y) : u[i]);
-        }
-        const float local_length = static_cast<float>(local.length());
-        const V3f to_light = rect.x * float(local.x) + rect.y * float(local.y) + rect.normal * float(local.z);
-        const float distance = to_light.length();
-        sample.direction = to_light / distance;
-        sample.distance = distance * kShadowEnd;
-        sample.radiance = radiance_;
-        sample.pdf = static_cast<float>(view.pdf(local)) * cube(distance / local_length) / rect.shear;
-        if (rect.image) {
-            const V2f place = image_place(rect, local, at);
-            sample.radiance *= rect.image->eval(place);
-            sample.pdf = 0.5f * (sample.pdf + image_pdf(rect, place, to_light));
-        }
-    }
-}
-
-// Upright as seen from the side that shines, where +x lies to the left.
-V2f WorldLight::image_place(const Rect& rect, const V3d& local_offset, const V3f& at) const {
-    return {0.5f - (float(local_offset.x) + at.x) / rect.width, 0.5f - (float(local_offset.y) + at.y) / rect.height};
-}
-
-float WorldLight::image_pdf(const Rect& rect, const V2f& place, const V3f& to_light) const {
-    const float distance2 = to_light.length2(), facing = -to_light.dot(rect.normal);
-    return rect.image->pdf(place) * distance2 * std::sqrt(distance2) /
-           (facing * (rect.width * rect.height * rect.x.cross(rect.y).length()));
-}
-
-bool WorldLight::hit_by(const Rect& rect, const V3f& origin, const V3f& direction, LightHit& hit) const {
-    V3f at, along;
-    rect.world_to_local.multDirMatrix(origin - rect.center, at);
-    rect.world_to_local.multDirMatrix(direction, along);
-    if (!(at.z > 0.0f && along.z < 0.0f)) return false;
-    const float t = -at.z / along.z, x = at.x + t * along.x, y = at.y + t * along.y;
-    if (!(std::abs(x) <= 0.5f * rect.width && std::abs(y) <= 0.5f * rect.height)) return false;
-    const SphericalRectangle view = seen_from(at, rect.width, rect.height);
-    const V3d local = V3d(along) * double(t);
-    const float density = static_cast<float>(view.pdf(local)) * cube(1.0f / along.length()) / rect.shear;
-    hit = {radiance_, density, t, hit.light};
-    if (rect.image) {
-        const V2f place = image_place(rect, local, at);
-        hit.radiance *= rect.image->eval(place);
-        hit.pdf = 0.5f * (density + image_pdf(rect, place, direction * t));
-    }
     return true;
 }
 

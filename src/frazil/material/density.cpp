@@ -13,6 +13,9 @@ constexpr float kStepsPerFeature = 4.0f;
 constexpr int kMostSteps = 1024;
 constexpr float kLacunarity = 2.03f;  // of fractal_noise
 
+constexpr std::size_t kPlaces = 65536;  // of a body that tell its mean
+constexpr float kThinnest = 1e-3f;      // mean density that diffusion still knows
+
 constexpr int kProbes = 16384;  // places that tell the mean and the spread of noise
 
 // A low-discrepancy sequence in the unit cube [Roberts2018].
@@ -77,6 +80,43 @@ DensityField::DensityField(const Density& density, const M44f& world_to_object, 
     double mean = 0.0;
     for (const float n : noise) mean += std::exp(double(gain_) * n);
     offset_ = -float(std::log(mean / kProbes));
+}
+
+float mean_density(const Density& density, const Mesh& mesh) {
+    if (!density.grid) return density.scale;
+    const DensityField field(density, M44f(), M44f());
+    const Box3f box = bounds(mesh);
+    const V3d center(box.center());
+    const int each = int(std::clamp<std::size_t>(kPlaces / std::max<std::size_t>(mesh.triangles.size(), 1), 1, 1024));
+    // Tetrahedra from the box's middle to the triangles, by their signed volumes.
+    double sum = 0.0, volume = 0.0, whole = 0.0, surface_sum = 0.0, area = 0.0;
+    int place = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const V3i& t = mesh.triangles[i];
+        const V3f& a = mesh.positions[std::size_t(t.x)];
+        const V3d cross = triangle_cross(mesh, i);
+        const double own_volume = cross.dot(V3d(a) - center) / 6.0, own_area = 0.5 * cross.length();
+        double inside = 0.0, on_surface = 0.0;
+        for (int k = 0; k < each; ++k) {
+            const V3f u = probe(place++);
+            const float side = std::sqrt(u.x);
+            const V3f on = a * (1.0f - side) + mesh.positions[std::size_t(t.y)] * (side * (1.0f - u.y)) +
+                           mesh.positions[std::size_t(t.z)] * (side * u.y);
+            inside += field.at(box.center() + (on - box.center()) * std::cbrt(u.z));
+            on_surface += field.at(on);
+        }
+        sum += own_volume * inside / each, volume += own_volume, whole += std::abs(own_volume);
+        surface_sum += own_area * on_surface / each, area += own_area;
+    }
+    if (std::abs(volume) > 1e-3 * whole) return std::max(0.0f, float(sum / volume));
+    return area > 0.0 ? float(surface_sum / area) : density.scale;
+}
+
+Medium mean_medium(const Medium& medium, const Density& density, float mean) {
+    Medium result = medium;
+    result.sigma_s_prime *= std::max(mean, kThinnest);
+    result.sigma_a *= 1.0f - density.absorption + density.absorption * mean;
+    return result;
 }
 
 float DensityField::noise_at(const V3f& rest) const {

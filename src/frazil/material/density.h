@@ -8,7 +8,8 @@
 // Valid: grids are integrated exactly but for rounding (a trilinear cell is a cubic along a ray, two Gauss points do);
 //   noise within 1e-3 over its first 1024 steps of a quarter of its finest feature, beyond which it counts as its mean.
 //   Thread-safe.
-// Not: diffusion, which spreads light by the medium itself; motion of a deforming mesh.
+// Not: how light spreads by diffusion from place to place: there a body is of one medium, that of its mean density
+//   (mean_medium); motion of a deforming mesh.
 #pragma once
 
 #include <memory>
@@ -16,6 +17,8 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/geometry/mesh.h"
+#include "frazil/translucency/medium.h"
 
 namespace frazil {
 
@@ -41,6 +44,12 @@ struct Density {
 
 // Refuse what is out of range: ValueError beginning with `path`.
 void check_density(const Density& density, const std::string& path);
+
+// The mean over a body: of noise its scale, of a grid that over the mesh's volume in its own frame; over its surface where
+// it encloses none.
+float mean_density(const Density& density, const Mesh& mesh);
+// The medium of a body of such a mean density.
+Medium mean_medium(const Medium& medium, const Density& density, float mean);
 
 // The density of one object, ready to be read along rays in world space.
 class DensityField {

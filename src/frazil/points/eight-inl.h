@@ -10,6 +10,7 @@
 #endif
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include <hwy/highway.h>
@@ -57,15 +58,16 @@ HWY_INLINE Eight least(Eight a, Eight b) {
 HWY_INLINE Eight most(Eight a, Eight b) {
     return {hn::Max(a.v, b.v)};
 }
-// Lane by lane x where a < b, a <= b or a == b; else y.
+// Lane by lane x where a < b or a == b; else y.
 HWY_INLINE Eight where_less(Eight a, Eight b, Eight x, Eight y) {
     return {hn::IfThenElse(hn::Lt(a.v, b.v), x.v, y.v)};
 }
-HWY_INLINE Eight where_at_most(Eight a, Eight b, Eight x, Eight y) {
-    return {hn::IfThenElse(hn::Le(a.v, b.v), x.v, y.v)};
-}
 HWY_INLINE Eight where_equal(Eight a, Eight b, Eight x, Eight y) {
     return {hn::IfThenElse(hn::Eq(a.v, b.v), x.v, y.v)};
+}
+// By the sign alone, that of -0 and of no number too.
+HWY_INLINE Eight where_negative(Eight a, Eight x, Eight y) {
+    return {hn::IfNegativeThenElse(a.v, x.v, y.v)};
 }
 // A bit for each lane where a < b.
 HWY_INLINE unsigned less(Eight a, Eight b) {
@@ -135,11 +137,11 @@ HWY_INLINE Eight most(Eight a, Eight b) {
 HWY_INLINE Eight where_less(Eight a, Eight b, Eight x, Eight y) {
     return each([&](int i) { return a.v[i] < b.v[i] ? x.v[i] : y.v[i]; });
 }
-HWY_INLINE Eight where_at_most(Eight a, Eight b, Eight x, Eight y) {
-    return each([&](int i) { return a.v[i] <= b.v[i] ? x.v[i] : y.v[i]; });
-}
 HWY_INLINE Eight where_equal(Eight a, Eight b, Eight x, Eight y) {
     return each([&](int i) { return a.v[i] == b.v[i] ? x.v[i] : y.v[i]; });
+}
+HWY_INLINE Eight where_negative(Eight a, Eight x, Eight y) {
+    return each([&](int i) { return std::signbit(a.v[i]) ? x.v[i] : y.v[i]; });
 }
 HWY_INLINE unsigned less(Eight a, Eight b) {
     unsigned bits = 0;

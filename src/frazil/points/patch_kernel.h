@@ -68,10 +68,20 @@ std::uint64_t cells_of(const Patch& patch);
 // The cells of `cells` without those that lie in the ball of one of the candidates from `first` on.
 std::uint64_t uncovered_cells(const Patch& patch, const Candidates& candidates, int first, std::uint64_t cells);
 
-// Throw up to `tries` darts (which are counted down) into the marked cells, evenly, until one hits the patch where no
+// Places of a patch, those of the lanes whose bits are set in `free` where a point can be put.
+inline constexpr int kDartsAtOnce = 8;
+struct Darts {
+    alignas(32) float x[kDartsAtOnce], y[kDartsAtOnce];
+    unsigned free = 0;
+};
+
+// Throw up to kDartsAtOnce darts into the marked cells, one or more, evenly. Free are those that hit the patch where no
 // candidate is nearer than the spacing.
-bool throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
-                 int& tries, V2f& hit);
+Darts throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
+                  int count);
+
+// Those of the darts that are free, where no candidate from `first` on is nearer than the spacing.
+unsigned free_darts(const Patch& patch, const Candidates& candidates, int first, const Darts& darts);
 
 // Share the patch among the points nearest to it. False where it gave up. Of `gap` all but excess2 and open are set only
 // where excess2 > 0.

@@ -13,20 +13,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace frazil::HWY_NAMESPACE {
 
-// The lane after each of a ring of corners; of lanes past the last the last, so that they make edges of no length.
-struct RingTable {
-    std::int32_t next[kWide + 1][kWide];
-};
-constexpr RingTable make_ring_table() {
-    RingTable table = {};
-    for (int count = 1; count <= kWide; ++count) {
-        for (int lane = 0; lane < kWide; ++lane)
-            table.next[count][lane] = lane < count ? (lane + 1) % count : count - 1;
-    }
-    return table;
-}
-constexpr RingTable kRing = make_ring_table();
-
 int find_patches_here(const PatchSlots& slots, const V3f& place, const V3f& normal, float least_cosine,
                       std::uint32_t* found, float* distances2) {
     const Eight px = splat(place.x), py = splat(place.y), pz = splat(place.z);
@@ -102,6 +88,10 @@ std::uint64_t uncovered_cells_here(const Patch& patch, const Candidates& candida
 
 // The place of the set bit of that rank.
 HWY_INLINE int select_bit(std::uint64_t bits, int rank) {
+#if HWY_ARCH_X86_64 && HWY_TARGET <= HWY_AVX3
+    // Where it is quick: some processors with AVX2 alone take hundreds of cycles.
+    return std::countr_zero(_pdep_u64(std::uint64_t(1) << rank, bits));
+#else
     int at = 0;
     for (int width = 32; width > 0; width /= 2) {
         const int below = std::popcount((bits >> at) & ((std::uint64_t(1) << width) - 1));
@@ -110,37 +100,44 @@ HWY_INLINE int select_bit(std::uint64_t bits, int rank) {
         at += is_above ? width : 0;
     }
     return at;
+#endif
 }
 
-bool throw_darts_here(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
-                      int& tries, V2f& hit) {
-    const V2f step = (patch.high - patch.low) * (1.0f / kWide);
-    const Eight corner_x = load(patch.x), corner_y = load(patch.y);
-    const std::int32_t* next = kRing.next[patch.count];
-    const Eight edge_x = permute(corner_x, next) - corner_x, edge_y = permute(corner_y, next) - corner_y;
-    const Eight zero = splat(0.0f);
-    const int marked = std::popcount(cells);
-    for (; tries > 0 && marked > 0; --tries) {
-        const std::uint64_t bits = random.next();
-        const int cell = marked == 64 ? int(bits & 63) : select_bit(cells, int((bits & 0xffff) * marked >> 16));
-        const float x = patch.low.x + (float(cell % kWide) + float(bits >> 16 & 0xffffff) * 0x1p-24f) * step.x;
-        const float y = patch.low.y + (float(cell / kWide) + float(bits >> 40) * 0x1p-24f) * step.y;
-        const Eight side = edge_x * (splat(y) - corner_y) - edge_y * (splat(x) - corner_x);
-        if (less(side, zero) != 0) continue;
-        // Where spacing varies, the largest is on the safe side.
-        const float spacing = patch.largest_spacing * (1.0f + kDistanceError);
-        const Eight limit = splat(spacing * spacing - (x * x + y * y)), x2 = splat(2.0f * x), y2 = splat(2.0f * y);
-        unsigned taken = 0;
-        for (int p = 0; p < candidates.count && taken == 0; p += kWide) {
-            const Eight to_p = load(candidates.s + p) - (load(candidates.x + p) * x2 + load(candidates.y + p) * y2);
-            taken = less(to_p, limit) & (candidates.count - p >= kWide ? 0xffu : (1u << (candidates.count - p)) - 1);
-        }
-        if (taken != 0) continue;
-        hit = V2f(x, y);
-        --tries;
-        return true;
+unsigned free_darts_here(const Patch& patch, const Candidates& candidates, int first, const Darts& darts) {
+    // Where spacing varies, the largest is on the safe side.
+    const float spacing = patch.largest_spacing * (1.0f + kDistanceError);
+    const Eight x = load(darts.x), y = load(darts.y), x2 = x + x, y2 = y + y;
+    Eight nearest = splat(1e30f);
+    for (int p = first; p < candidates.count; ++p) {
+        const Eight to_p = splat(candidates.s[p]) - (splat(candidates.x[p]) * x2 + splat(candidates.y[p]) * y2);
+        nearest = least(nearest, to_p);
     }
-    return false;
+    return darts.free & ~less(nearest, splat(spacing * spacing) - (x * x + y * y));
+}
+
+Darts throw_darts_here(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
+                       int count) {
+    const V2f step = (patch.high - patch.low) * (1.0f / kWide);
+    const int marked = std::popcount(cells);
+    Darts darts;
+    store(splat(patch.low.x), darts.x);
+    store(splat(patch.low.y), darts.y);
+    for (int i = 0; i < count; ++i) {
+        const std::uint64_t bits = random.next();
+        const int cell = select_bit(cells, int((bits & 0xffff) * marked >> 16));
+        darts.x[i] = patch.low.x + (float(cell % kWide) + float(bits >> 16 & 0xffffff) * 0x1p-24f) * step.x;
+        darts.y[i] = patch.low.y + (float(cell / kWide) + float(bits >> 40) * 0x1p-24f) * step.y;
+    }
+    const Eight x = load(darts.x), y = load(darts.y);
+    Eight inside = splat(1e30f);
+    for (int e = 0; e < patch.count; ++e) {
+        const int next = e + 1 == patch.count ? 0 : e + 1;
+        const float ex = patch.x[next] - patch.x[e], ey = patch.y[next] - patch.y[e];
+        inside = least(inside, splat(ex) * (y - splat(patch.y[e])) - splat(ey) * (x - splat(patch.x[e])));
+    }
+    darts.free = ~less(inside, splat(0.0f)) & ((1u << count) - 1);
+    if (darts.free != 0) darts.free = free_darts_here(patch, candidates, 0, darts);
+    return darts;
 }
 
 }  // namespace frazil::HWY_NAMESPACE
@@ -152,6 +149,7 @@ namespace frazil {
 HWY_EXPORT(find_patches_here);
 HWY_EXPORT(cells_of_here);
 HWY_EXPORT(uncovered_cells_here);
+HWY_EXPORT(free_darts_here);
 HWY_EXPORT(throw_darts_here);
 
 int find_patches(const PatchSlots& slots, const V3f& place, const V3f& normal, float least_cosine, std::uint32_t* found,
@@ -167,9 +165,13 @@ std::uint64_t uncovered_cells(const Patch& patch, const Candidates& candidates, 
     return HWY_DYNAMIC_DISPATCH(uncovered_cells_here)(patch, candidates, first, cells);
 }
 
-bool throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
-                 int& tries, V2f& hit) {
-    return HWY_DYNAMIC_DISPATCH(throw_darts_here)(patch, candidates, cells, random, tries, hit);
+unsigned free_darts(const Patch& patch, const Candidates& candidates, int first, const Darts& darts) {
+    return HWY_DYNAMIC_DISPATCH(free_darts_here)(patch, candidates, first, darts);
+}
+
+Darts throw_darts(const Patch& patch, const Candidates& candidates, std::uint64_t cells, RandomStream& random,
+                  int count) {
+    return HWY_DYNAMIC_DISPATCH(throw_darts_here)(patch, candidates, cells, random, count);
 }
 
 }  // namespace frazil

@@ -92,7 +92,8 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
 
     const double unit = spacing.per_vertex ? std::sqrt(extent.area / extent.spacings2) : spacing.constant;
     PointsInTiles points = {
-        mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61), with_areas, {}, {}, {}};
+        mesh, spacing, options.thin_walls, options.seed, unit, std::ldexp(extent.area, -61), with_areas, {}, {},
+        {},   {}};
     try {
         const double pairs = 2.0 * double(mesh.triangles.size()) + 4.0 * point_limit(options.max_points);
         const double width = std::max(kTileWidth * unit, kLeastTileWidth * largest);
@@ -104,6 +105,7 @@ PointsInTiles place_points(const Mesh& mesh, SpacingField spacing, double larges
 
     const std::size_t count = points.grid.count();
     points.darts.resize(count);
+    points.needs.resize(count);
     points.borders.resize(count);
     TileFillers fillers([&] { return TileFiller(points); });
     // A tile's turn comes when all of its neighbours of earlier colours are filled.

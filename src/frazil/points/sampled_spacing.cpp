@@ -10,66 +10,116 @@
 namespace frazil {
 namespace {
 
-constexpr double kLongestEdge = 2.0;  // of a piece, in the smallest of its spacings
-constexpr std::size_t kTriangleGrain = 256;
+constexpr double kLongestEdge = 2.0;   // of a piece, in the smallest of its spacings
+constexpr double kLongestBent = 1.0;   // of one on which the spacing is not linear
+constexpr double kMostBend = 0.05;     // of the spacing, that it departs from linear
+constexpr std::size_t kAtOnce = 4096;  // triangles that a thread takes, pieces that are looked at together
 
 // A part of a triangle: its corners, their barycentrics and spacings.
 struct Piece {
+    std::uint32_t triangle;
     std::array<V3f, 3> corners;
     std::array<V2f, 3> uv;
     std::array<float, 3> spacing;
+
+    int longest_edge() const {
+        const auto length2 = [&](int k) { return (V3d(corners[(k + 1) % 3]) - V3d(corners[k])).length2(); };
+        int longest = 0;
+        for (int k = 1; k < 3; ++k) longest = length2(k) > length2(longest) ? k : longest;
+        return longest;
+    }
 };
 
-struct Chunk {
-    std::vector<Piece> pieces;
-    std::vector<std::uint32_t> triangles;
-};
+class Cutter {
+  public:
+    Cutter(const Mesh& mesh, const SpacingFunction& spacing, std::atomic<std::size_t>& count, double most)
+        : mesh_(mesh), spacing_(spacing), count_(count), most_(most) {}
 
-struct Cutter {
-    const SpacingFunction& spacing;
-    std::uint32_t triangle;
-    Chunk& chunk;
-    std::atomic<std::size_t>& count;
-    double most;
+    std::vector<Piece> done;
 
-    float at(const V2f& uv) const {
-        const float value = spacing(triangle, uv);
-        if (value > 0.0f && std::isfinite(value)) return value;
-        throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", value, " on triangle ", triangle,
-                             ". It is in metres."));
+    void cut(std::size_t begin, std::size_t end) {
+        const std::array<V2f, 3> uv = {V2f(0.0f), V2f(1.0f, 0.0f), V2f(0.0f, 1.0f)};
+        places_.clear();
+        for (std::size_t i = begin; i < end; ++i) {
+            if (triangle_cross(mesh_, i) == V3d(0.0)) continue;
+            const V3i& t = mesh_.triangles[i];
+            const auto triangle = static_cast<std::uint32_t>(i);
+            todo_.push_back({triangle, {mesh_.positions[t.x], mesh_.positions[t.y], mesh_.positions[t.z]}, uv, {}});
+            for (int k = 0; k < 3; ++k) places_.push_back({triangle, uv[k]});
+        }
+        ask();
+        for (std::size_t i = 0; i < todo_.size(); ++i) {
+            for (int k = 0; k < 3; ++k) todo_[i].spacing[k] = spacings_[3 * i + k];
+        }
+        while (!todo_.empty()) look_at_last();
     }
 
-    void cut(const Piece& piece) const {
-        int longest = 0;
-        double length2 = -1.0;
-        for (int k = 0; k < 3; ++k) {
-            const double edge2 = (V3d(piece.corners[(k + 1) % 3]) - V3d(piece.corners[k])).length2();
-            if (edge2 > length2) length2 = edge2, longest = k;
+  private:
+    // Ask for the spacings at all places.
+    void ask() {
+        spacings_.resize(places_.size());
+        if (places_.empty()) return;
+        spacing_(places_, spacings_);
+        for (std::size_t i = 0; i < places_.size(); ++i) {
+            const float value = spacings_[i];
+            if (value > 0.0f && std::isfinite(value)) continue;
+            throw ValueError(str("poisson_points: spacing must be > 0 and finite, got ", value, " on triangle ",
+                                 places_[i].triangle, ". It is in metres."));
         }
-        const double middle = at((piece.uv[0] + piece.uv[1] + piece.uv[2]) / 3.0f);
-        const double least =
-            std::min<double>(middle, std::min(piece.spacing[0], std::min(piece.spacing[1], piece.spacing[2])));
-        const int a = longest, b = (longest + 1) % 3, c = (longest + 2) % 3;
+    }
+
+    // Halve the last pieces that there are to do, or take them as they are.
+    void look_at_last() {
+        const std::size_t first = todo_.size() - std::min(todo_.size(), kAtOnce);
+        looked_at_.assign(todo_.begin() + std::ptrdiff_t(first), todo_.end());
+        todo_.resize(first);
+        places_.clear();
+        for (const Piece& piece : looked_at_) {
+            const int a = piece.longest_edge(), b = (a + 1) % 3;
+            places_.push_back({piece.triangle, (piece.uv[0] + piece.uv[1] + piece.uv[2]) / 3.0f});
+            places_.push_back({piece.triangle, (piece.uv[a] + piece.uv[b]) * 0.5f});
+        }
+        ask();
+        for (std::size_t i = 0; i < looked_at_.size(); ++i) {
+            halve_or_keep(looked_at_[i], spacings_[2 * i], spacings_[2 * i + 1]);
+        }
+    }
+
+    void halve_or_keep(const Piece& piece, float at_center, float at_half) {
+        const int a = piece.longest_edge(), b = (a + 1) % 3, c = (a + 2) % 3;
         const V3f half = (piece.corners[a] + piece.corners[b]) * 0.5f;
-        const bool is_float_step = half == piece.corners[a] || half == piece.corners[b];
-        if (length2 <= kLongestEdge * kLongestEdge * least * least || is_float_step) {
-            if (double(count.fetch_add(1, std::memory_order_relaxed)) > most) {
-                throw ValueError(str("Mesh: spacing must be large enough for ", most,
+        const auto& s = piece.spacing;
+        const double least = std::min({at_center, at_half, s[0], s[1], s[2]});
+        const bool is_bent = std::abs(at_center - (s[0] + s[1] + s[2]) / 3.0f) > kMostBend * at_center ||
+                             std::abs(at_half - (s[a] + s[b]) * 0.5f) > kMostBend * at_half;
+        const double longest = (is_bent ? kLongestBent : kLongestEdge) * least;
+        const bool is_short = (V3d(piece.corners[b]) - V3d(piece.corners[a])).length2() <= longest * longest;
+        if (is_short || half == piece.corners[a] || half == piece.corners[b]) {
+            if (double(count_.fetch_add(1, std::memory_order_relaxed)) > most_) {
+                throw ValueError(str("Mesh: spacing must be large enough for ", most_,
                                      " pieces of the mesh, got less. Use a larger spacing or max_points."));
             }
-            chunk.pieces.push_back(piece);
-            chunk.triangles.push_back(triangle);
+            done.push_back(piece);
             return;
         }
         const V2f uv = (piece.uv[a] + piece.uv[b]) * 0.5f;
-        const float there = at(uv);
-        cut({{piece.corners[a], half, piece.corners[c]},
-             {piece.uv[a], uv, piece.uv[c]},
-             {piece.spacing[a], there, piece.spacing[c]}});
-        cut({{half, piece.corners[b], piece.corners[c]},
-             {uv, piece.uv[b], piece.uv[c]},
-             {there, piece.spacing[b], piece.spacing[c]}});
+        todo_.push_back({piece.triangle,
+                         {piece.corners[a], half, piece.corners[c]},
+                         {piece.uv[a], uv, piece.uv[c]},
+                         {s[a], at_half, s[c]}});
+        todo_.push_back({piece.triangle,
+                         {half, piece.corners[b], piece.corners[c]},
+                         {uv, piece.uv[b], piece.uv[c]},
+                         {at_half, s[b], s[c]}});
     }
+
+    const Mesh& mesh_;
+    const SpacingFunction& spacing_;
+    std::atomic<std::size_t>& count_;
+    double most_;
+    std::vector<Piece> todo_, looked_at_;
+    std::vector<SpacingPlace> places_;
+    std::vector<float> spacings_;
 };
 
 }  // namespace
@@ -78,35 +128,28 @@ PointSet poisson_points(const Mesh& mesh, const SpacingFunction& spacing, const 
                         Progress* progress) {
     check_mesh(mesh, "Mesh");
     const std::size_t count = mesh.triangles.size();
-    std::vector<Chunk> chunks((count + kTriangleGrain - 1) / kTriangleGrain);
+    std::vector<std::vector<Piece>> chunks((count + kAtOnce - 1) / kAtOnce);
     std::atomic<std::size_t> piece_count = 0;
     const double most = double(count) + 4.0 * point_limit(options.max_points);
-    parallel_for(count, kTriangleGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const auto triangle = static_cast<std::uint32_t>(i);
-            if (triangle_cross(mesh, i) == V3d(0.0)) continue;
-            const V3i& t = mesh.triangles[i];
-            const Cutter cutter = {spacing, triangle, chunks[begin / kTriangleGrain], piece_count, most};
-            const std::array<V2f, 3> uv = {V2f(0.0f), V2f(1.0f, 0.0f), V2f(0.0f, 1.0f)};
-            cutter.cut({{mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]},
-                        uv,
-                        {cutter.at(uv[0]), cutter.at(uv[1]), cutter.at(uv[2])}});
-        }
+    parallel_for(count, kAtOnce, [&](std::size_t begin, std::size_t end) {
+        Cutter cutter(mesh, spacing, piece_count, most);
+        cutter.cut(begin, end);
+        chunks[begin / kAtOnce] = std::move(cutter.done);
     });
 
     Mesh pieces;
     std::vector<float> spacings;
     std::vector<std::uint32_t> triangles;
     std::vector<std::array<V2f, 3>> uvs;
-    for (Chunk& chunk : chunks) {
-        for (const Piece& piece : chunk.pieces) {
+    for (std::vector<Piece>& chunk : chunks) {
+        for (const Piece& piece : chunk) {
             const auto first = static_cast<std::int32_t>(pieces.positions.size());
             pieces.triangles.emplace_back(first, first + 1, first + 2);
             pieces.positions.insert(pieces.positions.end(), piece.corners.begin(), piece.corners.end());
             spacings.insert(spacings.end(), piece.spacing.begin(), piece.spacing.end());
             uvs.push_back(piece.uv);
+            triangles.push_back(piece.triangle);
         }
-        triangles.insert(triangles.end(), chunk.triangles.begin(), chunk.triangles.end());
         chunk = {};
     }
     PointSet points = poisson_points(pieces, spacings, options, progress);

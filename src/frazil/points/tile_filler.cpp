@@ -10,9 +10,40 @@ namespace frazil {
 namespace {
 
 constexpr double kEvenDarts = 2.0;      // per spacing² of surface, over the whole tile in random order
-constexpr int kMostMisses = 5;          // of darts into the gaps of a patch, until they are left to the shares
 constexpr int kCoarseTries = 256;       // of darts into a gap where floats are coarse
 constexpr double kGapTolerance = 1e-9;  // of the spacing
+
+// How far from its walls a tile's points can matter to others, in largest spacings.
+constexpr double kWallReach = kPartReach + 1.1;
+// What a point may be needed for: a bit for each wall that it is near to, the lower and the upper one of each axis, and
+// one for patches of its own tile that wait for later tiles.
+constexpr unsigned kForBorder = 1u << 6;
+
+unsigned near_walls(const V3d& local, double size, double reach) {
+    unsigned walls = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        walls |= unsigned(local[axis] <= reach) << (2 * axis) | unsigned(local[axis] >= size - reach) << (2 * axis + 1);
+    }
+    return walls;
+}
+
+// What points of the tile at that offset are near to if they can matter here.
+unsigned walls_between(const V3i& offset) {
+    unsigned walls = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (offset[axis] != 0) walls |= 1u << (2 * axis + (offset[axis] < 0));
+    }
+    return walls;
+}
+
+// Ask the memory for a triangle that is needed soon.
+void prefetch(const Mesh& mesh, const std::int32_t* triangles, std::size_t count) {
+    if (count > 16) __builtin_prefetch(&mesh.triangles[triangles[16]]);
+    if (count > 8) {
+        const V3i& soon = mesh.triangles[triangles[8]];
+        for (int k = 0; k < 3; ++k) __builtin_prefetch(&mesh.positions[soon[k]]);
+    }
+}
 
 // The float that many floats above.
 float stepped(float x, int steps) {
@@ -50,25 +81,34 @@ void TileFiller::prepare_neighbourhood() {
     placed_.clear();
 }
 
-// Enter the points of a tile that can matter.
-void TileFiller::enter(std::size_t tile) {
+// Enter the points of a tile that are needed for all that is asked, and can matter.
+void TileFiller::enter(std::size_t tile, unsigned need) {
     Box3f box;
     for (int axis = 0; axis < 3; ++axis) {
         const double origin = frame_.origin()[axis], unit = frame_.unit;
         box.min[axis] = std::nextafter(float(near_.box_in_reach().min[axis] * unit + origin), -HUGE_VALF);
         box.max[axis] = std::nextafter(float(near_.box_in_reach().max[axis] * unit + origin), HUGE_VALF);
     }
-    for (Dart& dart : points_.darts[tile]) {
+    std::vector<Dart>& darts = points_.darts[tile];
+    const std::vector<std::uint8_t>& needs = points_.needs[tile];
+    for (std::size_t i = 0; i < darts.size(); ++i) {
+        if ((needs[i] & need) != need) continue;
+        Dart& dart = darts[i];
         if (!box.intersects(dart.position)) continue;
         near_.add(V3f(frame_.to_local(dart.position)), dart.normal, dart.position);
         entered_.push_back(&dart);
     }
 }
 
+void TileFiller::enter_neighbours() {
+    for (const TileGrid::Neighbour& other : around_) enter(other.tile, walls_between(other.offset));
+}
+
 void TileFiller::fill(std::size_t tile) {
     begin(tile);
     const TileGrid& grid = points_.grid;
     for (std::uint64_t i = grid.starts[tile]; i < grid.starts[tile + 1]; ++i) {
+        prefetch(points_.mesh, &grid.triangles[i], grid.starts[tile + 1] - i);
         append_patches(points_.mesh, points_.spacing, frame_, grid.triangles[i], patches_);
     }
     if (patches_.empty()) return;
@@ -81,7 +121,7 @@ void TileFiller::fill(std::size_t tile) {
         }
     }
     prepare_neighbourhood();
-    for (const TileGrid::Neighbour& other : around_) enter(other.tile);
+    enter_neighbours();
 
     const std::uint64_t key = grid.keys[tile];
     random_ = {(std::uint64_t(points_.seed) << 32 | hash(points_.seed, std::uint32_t(key >> 32))) ^ key};
@@ -97,6 +137,19 @@ void TileFiller::fill(std::size_t tile) {
     for (const std::uint32_t patch : order_) cover(patch);
     for (std::size_t patch = 0; patch < patches_.size(); ++patch) share_again(patch);
 
+    std::vector<std::uint8_t>& needs = points_.needs[tile];
+    needs.reserve(placed_.size());
+    const double reach = kWallReach * points_.spacing.constant / points_.unit + rounding_;
+    for (const Dart& dart : placed_) {
+        needs.push_back(std::uint8_t(near_walls(frame_.to_local(dart.position), frame_.size(), reach)));
+    }
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        if (states_[i].is_final) continue;
+        const Candidates near = near_.candidates(i);
+        for (int k = 0; k < near.count; ++k) {
+            if (near.points[k] >= entered_.size()) needs[near.points[k] - entered_.size()] |= kForBorder;
+        }
+    }
     // The points keep their places from here on, as others add to their areas.
     points_.darts[tile] = std::vector<Dart>(placed_);
     for (Dart& dart : points_.darts[tile]) entered_.push_back(&dart);
@@ -113,14 +166,15 @@ void TileFiller::share_border(std::size_t tile) {
     border.swap(points_.borders[tile]);
     if (border.empty()) return;
     begin(tile);
-    for (const std::int32_t triangle : border) {
-        append_patches(points_.mesh, points_.spacing, frame_, triangle, patches_);
+    for (std::size_t i = 0; i < border.size(); ++i) {
+        prefetch(points_.mesh, &border[i], border.size() - i);
+        append_patches(points_.mesh, points_.spacing, frame_, border[i], patches_);
     }
     if (points_.with_areas) std::erase_if(patches_, [&](const Patch& patch) { return is_final(patch); });
     if (patches_.empty()) return;
     prepare_neighbourhood();
-    enter(tile);
-    for (const TileGrid::Neighbour& other : around_) enter(other.tile);
+    enter(tile, kForBorder);
+    enter_neighbours();
     quanta_.assign(near_.size(), 0);
     for (std::size_t i = 0; i < patches_.size(); ++i) {
         share(i);
@@ -154,27 +208,32 @@ void TileFiller::throw_evenly(double density) {
         const float spacing = 0.5f * (patch.least_spacing + patch.largest_spacing);
         const float area = extent.x * extent.y * (float(std::popcount(state.cells)) / 64.0f);
         int tries = int(float(density) * area / (spacing * spacing) + random_.next_float());
-        V2f hit;
-        while (throw_darts(patch, near_.candidates(i), state.cells, random_, tries, hit)) {
-            place(i, hit.x, hit.y, 0);
-        }
+        for (; tries > 0; tries -= kDartsAtOnce) place_free(i, state.cells, std::min(tries, kDartsAtOnce), 0);
     }
 }
 
-// Throw darts where no ball covers the surface, until few are left.
+// Throw darts where no ball covers the surface, until none is free.
 void TileFiller::throw_into_gaps() {
     for (const std::uint32_t i : order_) {
-        const Patch& patch = patches_[i];
-        PatchState& state = states_[i];
-        int tries = kMostMisses;
-        V2f hit;
-        take_covered(i);
-        while (state.cells != 0 && throw_darts(patch, near_.candidates(i), state.cells, random_, tries, hit)) {
-            if (!place(i, hit.x, hit.y, 0)) continue;
-            take_covered(i);
-            tries = kMostMisses;
-        }
+        do take_covered(i);
+        while (place_free(i, states_[i].cells, kDartsAtOnce, 0) > 0);
     }
+}
+
+// Throw darts into cells of a patch, and place points where they are free: how many.
+int TileFiller::place_free(std::size_t i, std::uint64_t cells, int count, int most_steps) {
+    if (cells == 0) return 0;
+    const Patch& patch = patches_[i];
+    int placed = 0;
+    Darts darts = throw_darts(patch, near_.candidates(i), cells, random_, count);
+    while (darts.free != 0) {
+        const int known = int(near_.count(i)), lane = std::countr_zero(darts.free);
+        darts.free &= darts.free - 1;
+        if (!place(i, darts.x[lane], darts.y[lane], most_steps)) continue;
+        ++placed;
+        darts.free = free_darts(patch, near_.candidates(i), known, darts);
+    }
+    return placed;
 }
 
 // Take the cells from a patch that points have covered since it was looked at.
@@ -213,13 +272,9 @@ void TileFiller::cover(std::size_t i) {
 
 // Try many places of a patch, each with the floats around it.
 bool TileFiller::place_somewhere(std::size_t i) {
-    const Patch& patch = patches_[i];
-    const Candidates near = near_.candidates(i);
-    const std::uint64_t cells = uncovered_cells(patch, near, 0, cells_of(patch));
-    int tries = kCoarseTries;
-    V2f hit;
-    while (throw_darts(patch, near, cells, random_, tries, hit)) {
-        if (place(i, hit.x, hit.y, 2)) return true;
+    const std::uint64_t cells = uncovered_cells(patches_[i], near_.candidates(i), 0, cells_of(patches_[i]));
+    for (int tries = 0; tries < kCoarseTries; tries += kDartsAtOnce) {
+        if (place_free(i, cells, kDartsAtOnce, 2) > 0) return true;
     }
     return false;
 }

@@ -39,6 +39,8 @@ struct PointsInTiles {
     bool with_areas;      // as soon as they are known; else all patches wait as those at borders do
     TileGrid grid;
     std::vector<std::vector<Dart>> darts;
+    // For each of them, what can need it beside its own tile's final patches: see near_walls() and kForBorder.
+    std::vector<std::vector<std::uint8_t>> needs;
     std::vector<std::vector<std::int32_t>> borders;  // triangles with patches that wait for later tiles
 };
 
@@ -63,12 +65,14 @@ class TileFiller {
 
     void begin(std::size_t tile);
     void prepare_neighbourhood();
-    void enter(std::size_t tile);
+    void enter(std::size_t tile, unsigned need);
+    void enter_neighbours();
     bool is_final(const Patch& patch) const;
     void throw_evenly(double density);
     void throw_into_gaps();
     void take_covered(std::size_t patch);
     void cover(std::size_t patch);
+    int place_free(std::size_t patch, std::uint64_t cells, int darts, int most_steps);
     bool place_somewhere(std::size_t patch);
     void share_again(std::size_t patch);
     void share(std::size_t patch);

@@ -83,7 +83,7 @@ PointSpacing spacing_on(const Scene& scene, const Object& object, float constant
     const auto& texture = std::get<IceMaterial>(scene.materials[object.material].model).spacing;
     PointSpacing result;
     result.constant = constant;
-    SpacingFunction base = [constant](std::uint32_t, const V2f&) { return constant; };
+    std::function<float(std::uint32_t, const V2f&)> base = [constant](std::uint32_t, const V2f&) { return constant; };
     if (options.spacing == 0.0f && !mesh.spacing.empty()) {
         result.at_vertices = mesh.spacing;
         for (float& value : result.at_vertices) value *= options.spacing_scale;
@@ -99,19 +99,20 @@ PointSpacing spacing_on(const Scene& scene, const Object& object, float constant
             base = [&mesh, &texture, least, scale = options.spacing_scale](std::uint32_t triangle, const V2f& uv) {
                 return scale * std::max(least, eval_float(texture, mesh.uvs.at(mesh.triangles, triangle, uv)));
             };
-            result.anywhere = base;
+            result.anywhere = at_each_place(base);
         }
     }
     if (options.spacing_pixels == 0.0f) return result;
     const PixelCone cone = pixel_cone(scene.camera, options.width, options.height);
     const V3f eye = V3f(0.0f) * scene.camera.camera_to_world;
-    result.anywhere = [=, &mesh, &object, pixels = options.spacing_pixels](std::uint32_t triangle, const V2f& uv) {
+    result.anywhere = at_each_place([=, &mesh, &object, pixels = options.spacing_pixels](std::uint32_t triangle,
+                                                                                         const V2f& uv) {
         const V3i& t = mesh.triangles[triangle];
         const V3f place =
             mesh.positions[t.x] * (1.0f - uv.x - uv.y) + mesh.positions[t.y] * uv.x + mesh.positions[t.z] * uv.y;
         const float distance = (place * object.local_to_world - eye).length(), finest = base(triangle, uv);
         return std::clamp(pixels * 2.0f * (cone.radius + cone.spread * distance), finest, kCoarsestByPixels * finest);
-    };
+    });
     return result;
 }
 
@@ -193,12 +194,11 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         if (!bodies[i] || lit[i].points.size() > 0) continue;
         const Object& object = scene.objects[i];
-        const IceMaterial& material = *bodies[i]->material;
         Shape& shape = shapes.of(object);
         if (!(shape.area > 0.0)) continue;
         try {
-            const float spacing = point_spacing(material, shape.area, options);
-            const Rgb extinction = material.medium.sigma_s_prime + material.medium.sigma_a;
+            const float spacing = point_spacing(*bodies[i], shape.area, options);
+            const Rgb extinction = bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a;
             coarse.add(object.path, spacing, 1.0f / max_component(extinction));
             lit[i].points = shapes.points_of(object, shape, spacing, options, progress);
         } catch (const ValueError& error) {
@@ -273,11 +273,11 @@ void copy_group(const std::vector<Value>& source, std::size_t from, std::size_t 
 
 }  // namespace
 
-float point_spacing(const IceMaterial& material, double area, const RenderOptions& options) {
+float point_spacing(const Body& body, double area, const RenderOptions& options) {
     float spacing = options.spacing;
-    if (spacing == 0.0f) spacing = material.spacing.value;
+    if (spacing == 0.0f) spacing = body.material->spacing.value;
     if (spacing == 0.0f) {
-        const Rgb sigma_t_prime = material.medium.sigma_s_prime + material.medium.sigma_a;
+        const Rgb sigma_t_prime = body.medium.sigma_s_prime + body.medium.sigma_a;
         const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);
         const double coarsest = std::sqrt(kPointsPerSpacing2 * area / kFewestByDefault);
         spacing = static_cast<float>(std::clamp(kDefaultSpacing / max_component(sigma_t_prime), finest, coarsest));

@@ -18,7 +18,7 @@ namespace frazil {
 
 // The spacing of an object's points: the render's, else the material's, else half the shortest mean free path of a
 // channel, but so that the object alone has about a thousand points at least and a million at most.
-float point_spacing(const IceMaterial& material, double area, const RenderOptions& options);
+float point_spacing(const Body& body, double area, const RenderOptions& options);
 
 struct Bake {
     std::vector<std::string> groups;  // the light groups, in the scene's order

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <tuple>
 
 #include "frazil/render/interior.h"
 #include "frazil/render/stopwatch.h"
@@ -43,15 +44,23 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         std::optional<Profile> profile;
         std::shared_ptr<const TreeKernel> kernel, plain_kernel;
     };
-    std::map<std::pair<const IceMaterial*, bool>, Shared> shared;
-    std::map<std::uint32_t, bool> closed;  // by mesh, of those that it matters for
+    std::map<std::tuple<const IceMaterial*, bool, float>, Shared> shared;     // by mean density
+    std::map<std::pair<const IceMaterial*, std::uint32_t>, float> densities;  // by mesh
+    std::map<std::uint32_t, bool> closed;                                     // by mesh, of those that it matters for
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const auto* material = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
         if (!material) continue;
         auto& boundary = boundaries[material->medium.eta];
         if (!boundary) boundary = std::make_shared<DielectricAlbedo>(material->medium.eta);
+        float mean = 1.0f;
+        if (!material->density.is_even()) {
+            const std::uint32_t mesh = scene.objects[i].mesh;
+            const auto [found, is_new] = densities.try_emplace({material, mesh}, 1.0f);
+            if (is_new) found->second = mean_density(material->density, scene.meshes[mesh]);
+            mean = found->second;
+        }
+        const Medium medium = mean_medium(material->medium, material->density, mean);
         // What rays trace of the light that is scattered once, the profile leaves out.
-        const Medium& medium = material->medium;
         bool is_traced = material->volume > 0.0f;
         if (is_traced) {
             const auto [found, is_new] = closed.try_emplace(scene.objects[i].mesh, false);
@@ -59,13 +68,13 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             is_traced = found->second;
         }
         const double traced = is_traced ? material->volume : 0.0;
-        auto& [profile, kernel, plain_kernel] = shared[{material, is_traced}];
+        auto& [profile, kernel, plain_kernel] = shared[{material, is_traced, mean}];
         if (!profile) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
-        bodies[i] = std::make_unique<Body>(material, boundary, *profile, kernel, plain_kernel);
+        bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
@@ -103,10 +112,10 @@ std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
     const auto make = [&](PlacementMask mask) {
-        return make_tree(points, body.plain_kernel,
-                         thickness_gain(points.in_world(), ray_scene_, body.material->medium, body.traced_once,
-                                        sets_.shells(leader), mask),
-                         1);
+        return make_tree(
+            points, body.plain_kernel,
+            thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, sets_.shells(leader), mask),
+            1);
     };
     if (!is_shared(leader)) return make(nullptr);
     auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
@@ -159,9 +168,10 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
     }
 }
 
-void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-                 bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
-                 const std::function<void(std::size_t)>& has_taken) {
+TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
+                             const RayScene& ray_scene, bool wants_depth, PointGatherPlan plan,
+                             std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+                             const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
     // A bake from elsewhere has no cells: make those that its light was a mean over.
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -171,7 +181,7 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             false, [&](const PointSet& points) { return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), 1); });
         cloud.drop_places();
     }
-    const TranslucencySets sets(scene, ray_scene, bodies, lit);
+    TranslucencySets sets(scene, ray_scene, bodies, lit);
     stats.warnings.insert(stats.warnings.end(), sets.warnings().begin(), sets.warnings().end());
     ThicknessTrees thickness(scene, ray_scene, bodies, sets);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -187,11 +197,11 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
             continue;
         }
         const bool is_alone = !sets.shells(i);
-        body.tree =
-            is_alone ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
-                     : make_tree(sets.points(i), body.kernel,
-                                 sets.united<Rgb>(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
-                                 sets.united<V3f>(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
+        body.tree = is_alone
+                        ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
+                        : make_tree(sets.points(i), body.kernel,
+                                    sets.united(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
+                                    sets.united(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
         if (is_alone) has_taken(i);
         if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
@@ -200,14 +210,27 @@ void plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::siz
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();
     }
+    return sets;
 }
 
 std::vector<Passage> passages_of(const Scene& scene) {
     std::vector<Passage> passages(scene.objects.size());
+    const SurfaceResolver resolver(scene);
     for (std::size_t i = 0; i < passages.size(); ++i) {
         const auto* ice = std::get_if<IceMaterial>(&scene.materials[scene.objects[i].material].model);
         if (!ice || ice->refraction == 0.0f) continue;
-        passages[i] = {ice->refraction, ice->medium.eta, ice->medium.sigma_s_prime + ice->medium.sigma_a};
+        const Medium& medium = ice->medium;
+        Passage& passage = passages[i];
+        passage = {ice->refraction, medium.eta, medium.sigma_s_prime + medium.sigma_a, ice->refraction_tint,
+                   ice->priority};
+        if (ice->density.is_even()) continue;
+        passage.attenuation = medium.sigma_a * (1.0f - ice->density.absorption);
+        passage.dense_attenuation = medium.sigma_s_prime + medium.sigma_a * ice->density.absorption;
+        passage.depth = [field = DensityField(ice->density, scene.objects[i].local_to_world.inverse(),
+                                              resolver.world_to_rest(std::uint32_t(i)))](
+                            const V3f& origin, const V3f& direction, float length) {
+            return field.depth(origin, direction, length);
+        };
     }
     return passages;
 }

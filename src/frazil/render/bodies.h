@@ -25,10 +25,11 @@
 namespace frazil {
 
 struct Body {
-    Body(const IceMaterial* of_material, std::shared_ptr<const DielectricAlbedo> with_boundary,
+    Body(const IceMaterial* of_material, const Medium& of_medium, std::shared_ptr<const DielectricAlbedo> with_boundary,
          const Profile& with_profile, std::shared_ptr<const TreeKernel> sum,
          std::shared_ptr<const TreeKernel> plain_sum)
         : material(of_material),
+          medium(of_medium),
           boundary(std::move(with_boundary)),
           profile(with_profile),
           kernel(std::move(sum)),
@@ -36,15 +37,18 @@ struct Body {
           total_reflectance(albedo(with_profile)) {}
 
     const IceMaterial* material = nullptr;
+    Medium medium;  // of the core: the material's at the body's mean density
     std::shared_ptr<const DielectricAlbedo> boundary;
     Profile profile;
     std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
     Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
-    // Trees stand where their points do: places are brought there by `to_points`, and `to_own_points` for the overlays'.
-    M44f to_points, to_own_points;
-    std::shared_ptr<const PointTree> tree;          // none where the object has no surface; one for a translucency set
-    std::shared_ptr<const PointTree> thickness;     // ThicknessTrees
-    std::shared_ptr<const PointTree> overlay_tree;  // plant_overlay_trees, where such layers are asked for
+    // Trees stand where their points do: places are brought there by `to_points`.
+    M44f to_points;
+    std::shared_ptr<const PointTree> tree;       // none where the object has no surface; one for a translucency set
+    std::shared_ptr<const PointTree> thickness;  // ThicknessTrees
+    // plant_overlay_trees, where such layers are asked for; which layers its columns are.
+    std::shared_ptr<const PointTree> overlay_tree;
+    std::vector<std::uint32_t> overlay_layers;
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
@@ -114,8 +118,8 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
 // seen. So bounces keep energy, and a picture's compensation can be changed exactly after its render. `gains` as above.
 void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
-// What each object lets through for shadow rays: ice what its boundary transmits and its medium neither scatters nor
-// absorbs; others nothing.
+// What each object lets through for shadow rays: ice what its boundary transmits and its medium, as dense as it is in each
+// place, neither scatters nor absorbs; others nothing. The scene must outlive these.
 std::vector<Passage> passages_of(const Scene& scene);
 
 // One entry per object of the scene, without trees; null for those that are not ice.
@@ -123,8 +127,9 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
 // use for it or a layer `wants_depth`; and the gathers at its points, where the plan wants them. `has_taken(i)` is called
-// when the light of an object is needed no more. Fills points, nodes and seconds of the stats.
-void plant_trees(
+// when the light of an object is needed no more. Fills points, nodes and seconds of the stats. Returns which bodies share
+// their tree; it refers to what was given.
+TranslucencySets plant_trees(
     const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
     bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
     const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});

@@ -192,8 +192,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             if (!gains[i] || lit[i].points.size() == 0) continue;
             // At first the light that is there, then what the last bounce brought.
             const auto values = [&](std::size_t k) { return bounce == 0 ? &lit[k].irradiance : &last[k].values; };
-            exchange[i] = exchange_of(*bodies[i], sets.points(i), sets.united<Rgb>(i, groups, values), groups,
-                                      *gains[i], options.gather);
+            exchange[i] = exchange_of(*bodies[i], sets.points(i), sets.united(i, groups, values), groups, *gains[i],
+                                      options.gather);
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;

@@ -78,7 +78,7 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
         answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
         is_blended.push_back(i);
     }
-    const Medium& medium = body.material->medium;
+    const Medium& medium = body.medium;
     const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
     const std::vector<V3f> at_tree = moved(places, body.to_points);
@@ -110,8 +110,8 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         tile.gathers += places.size();
         Gathered by_overlay;
         if (body.overlay_tree) {
-            const std::vector<V3f> own = moved(places, body.to_own_points);
-            by_overlay = body.overlay_tree->gather(own.data(), own.size(), options);
+            const std::vector<V3f> at_tree = moved(places, body.to_points);
+            by_overlay = body.overlay_tree->gather(at_tree.data(), at_tree.size(), options);
         }
 
         for (std::size_t i = begin; i < end; ++i) {
@@ -142,11 +142,9 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
                 tile.add_coverage(request.pixel, coverage * request.samples, lacking * request.samples);
             }
-            if (!request.overlays.empty()) {
-                const Rgb* taken =
-                    request.is_primary && body.overlay_tree ? &by_overlay.exitance[row * by_overlay.groups] : nullptr;
-                add_overlays(request, &gathered.exitance[row * gathered.groups], taken, gathered.groups, gain, fill,
-                             tile);
+            add_overlays(request, &gathered.exitance[row * gathered.groups], gathered.groups, gain, fill, tile);
+            if (request.is_primary && body.overlay_tree) {
+                add_taken(request, &by_overlay.exitance[row * by_overlay.groups], gathered.groups, gain, tile);
             }
             if (layout_.ice_plane_count() == 0) continue;
             const Rgb elsewhere = request.diffuse + request.specular + request.refraction;
@@ -166,10 +164,9 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
     tile.requests.clear();
 }
 
-// What a change of each overlay's opacity adds: to light that came by way of it, and to what enters the points around here.
-// `taken` is (overlays, groups).
-void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, const Rgb* taken, std::size_t groups,
-                             const Rgb& gain, const Rgb& fill, Tile& tile) const {
+// What a change of each overlay's opacity adds to light that came by way of it.
+void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, std::size_t groups, const Rgb& gain,
+                             const Rgb& fill, Tile& tile) const {
     for (const GatherRequest::Overlay& overlay : request.overlays) {
         for (std::size_t group = 0; group < groups; ++group) {
             Rgb light = exitance[group] * gain;
@@ -177,11 +174,28 @@ void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, 
             const auto add = [&](FilmLayout::OverlayPlane plane, const Rgb& change) {
                 tile.add_to_plane(request.pixel, overlay.plane + plane, group, change);
             };
-            const Rgb less = taken ? taken[overlay.own * groups + group] * gain : Rgb(0.0f);
             add(FilmLayout::kDiffuse, light * request.diffuse * overlay.diffuse);
-            add(FilmLayout::kTranslucency, (light * overlay.core + less) * request.translucency);
+            add(FilmLayout::kTranslucency, light * overlay.core * request.translucency);
             add(FilmLayout::kRefraction, light * request.refraction * overlay.seen_through);
-            add(FilmLayout::kSquared, less * overlay.core * request.translucency);
+        }
+    }
+}
+
+// What it takes from the light that enters the points around here, be the overlay here or on another member of the
+// translucency set. `taken` is (layers, groups).
+void Gathering::add_taken(const GatherRequest& request, const Rgb* taken, std::size_t groups, const Rgb& gain,
+                          Tile& tile) const {
+    const std::vector<std::uint32_t>& layers = bodies_[request.object]->overlay_layers;
+    for (std::size_t k = 0; k < layers.size(); ++k) {
+        const std::size_t plane = layout_.overlay_plane(layers[k]);
+        Rgb here(0.0f);  // the overlay's own change of what comes from the core
+        for (const GatherRequest::Overlay& overlay : request.overlays) {
+            if (overlay.plane == plane) here = overlay.core;
+        }
+        for (std::size_t group = 0; group < groups; ++group) {
+            const Rgb less = taken[k * groups + group] * gain * request.translucency;
+            tile.add_to_plane(request.pixel, plane + FilmLayout::kTranslucency, group, less);
+            tile.add_to_plane(request.pixel, plane + FilmLayout::kSquared, group, less * here);
         }
     }
 }

@@ -29,8 +29,10 @@ class Gathering {
     void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
                     std::size_t row, const Rgb* thin_gain, Tile& tile) const;
 
-    void add_overlays(const GatherRequest& request, const Rgb* exitance, const Rgb* taken, std::size_t groups,
-                      const Rgb& gain, const Rgb& fill, Tile& tile) const;
+    void add_overlays(const GatherRequest& request, const Rgb* exitance, std::size_t groups, const Rgb& gain,
+                      const Rgb& fill, Tile& tile) const;
+    void add_taken(const GatherRequest& request, const Rgb* taken, std::size_t groups, const Rgb& gain,
+                   Tile& tile) const;
 
     const Scene& scene_;
     const std::vector<std::unique_ptr<Body>>& bodies_;

@@ -12,6 +12,7 @@
 
 #include "frazil/render/bodies.h"
 #include "frazil/render/surface.h"
+#include "frazil/render/translucency_sets.h"
 
 namespace frazil {
 
@@ -27,8 +28,10 @@ std::vector<OverlayShare> overlay_shares(const Surface& surface, const std::vect
 // A share's change of light from the core, of which `share` is not seen through.
 Rgb change_of_core(const OverlayShare& overlay, const Rgb& share);
 
-// Give every body with overlays a tree of the light that each of them takes from its points: (N, overlays * groups).
-void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
+// Give every body with overlays a tree of the light that each of them takes from its points: (N, layers * groups). A
+// translucency set has one of all of its members' overlays. `layer_of` is by material and its overlay.
+void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, const TranslucencySets& sets,
+                         const std::vector<std::vector<std::uint32_t>>& layer_of, std::size_t groups,
                          std::vector<std::unique_ptr<Body>>& bodies);
 
 }  // namespace frazil

@@ -199,7 +199,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     for (const OverlayShare& overlay : path.overlays) {
         const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
         const Rgb of_core = core.is_entered ? change_of_core(overlay, share) : overlay.core;
-        request.overlays.push_back({plane, overlay.overlay, overlay.diffuse, of_core, overlay.seen_through});
+        request.overlays.push_back({plane, overlay.diffuse, of_core, overlay.seen_through});
     }
     tile.requests.push_back(std::move(request));
 }

@@ -11,6 +11,7 @@
 #include "frazil/base/error.h"
 #include "frazil/base/parallel.h"
 #include "frazil/lighting/group_balance.h"
+#include "frazil/render/buried_lights.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
@@ -259,26 +260,28 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
     LightSampler lights(scene.lights);
+    if (!baked) stats.warnings = warnings_of_buried_lights(scene, ray_scene, lights);
     const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
     balance_groups(lights, ray_scene, receivers_in_view(scene.camera, aspect, ray_scene));
     std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     FilmLayout layout = make_layout(scene, bodies, options.aovs, options.lpes, options.mattes);
     const std::vector<std::string> groups = light_groups(scene.lights);
     std::optional<Openness> openness;
+    const bool has_overlays = layout.has("overlay");
     const auto plant = [&](const std::vector<LitPoints>& lit, const std::function<void(std::size_t)>& has_taken) {
         const double paths = double(options.width) * options.height * options.samples;
-        plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
-                    {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
+        const TranslucencySets sets =
+            plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
+                        {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
+        if (has_overlays) plant_overlay_trees(scene, lit, sets, layout.overlay_of, groups.size(), bodies);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
             openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
         }
     };
-    const bool has_overlays = layout.has("overlay");
     if (baked) {
         check_bake(scene, *baked);
         plant(baked->bodies, [](std::size_t) {});
-        if (has_overlays) plant_overlay_trees(scene, baked->bodies, groups.size(), bodies);
     } else {
         Bake bake = make_bake(scene, ray_scene, bodies, options, {}, stats, progress);
         plant(bake.bodies, [&](std::size_t object) {
@@ -286,7 +289,6 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
             bake.bodies[object].irradiance = {};
             bake.bodies[object].moments = {};
         });
-        if (has_overlays) plant_overlay_trees(scene, bake.bodies, groups.size(), bodies);
     }
 
     Stopwatch render_watch(stats.seconds["render"]);
@@ -345,6 +347,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
 BakeResult bake_in_arena(const Scene& scene, const RenderOptions& options, Bake known, Progress* progress) {
     RenderStats stats;
     const RayScene ray_scene = make_ray_scene(scene, options, stats);
+    stats.warnings = warnings_of_buried_lights(scene, ray_scene, LightSampler(scene.lights));
     const std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     Bake result = make_bake(scene, ray_scene, bodies, options, std::move(known), stats, progress);
     for (const LitPoints& lit : result.bodies) stats.points += lit.points.size();

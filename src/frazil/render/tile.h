@@ -58,9 +58,9 @@ struct GatherRequest {
     };
     std::vector<Lpe> lpes;
     // Of the overlays where the path began: their plane, and the change of its light through diffuse reflection, from the
-    // core and through the surface; which overlay of the body's material it is, where the camera sees the body itself.
+    // core and through the surface.
     struct Overlay {
-        std::size_t plane = 0, own = 0;
+        std::size_t plane = 0;
         Rgb diffuse = Rgb(0.0f), core = Rgb(0.0f), seen_through = Rgb(0.0f);
     };
     std::vector<Overlay> overlays;

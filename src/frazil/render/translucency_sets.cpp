@@ -14,8 +14,8 @@ constexpr float kSkin = 0.1f;
 
 bool can_share(const Body& a, const Body& b) {
     const IceMaterial &x = *a.material, &y = *b.material;
-    return x.medium.sigma_s_prime == y.medium.sigma_s_prime && x.medium.sigma_a == y.medium.sigma_a &&
-           x.medium.eta == y.medium.eta && x.profile == y.profile && a.traced_once == b.traced_once &&
+    return a.medium.sigma_s_prime == b.medium.sigma_s_prime && a.medium.sigma_a == b.medium.sigma_a &&
+           a.medium.eta == b.medium.eta && x.profile == y.profile && a.traced_once == b.traced_once &&
            x.ramp.distances == y.ramp.distances && x.ramp.colors == y.ramp.colors &&
            x.ramp.preserve_energy == y.ramp.preserve_energy;
 }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "frazil/render/bodies.h"
@@ -32,17 +33,18 @@ class TranslucencySets {
     const PlacedPoints& points(std::size_t leader) const;
     // Their values, (N, columns), from those of each member's own points; empty where a member has none.
     // `values(object)` points to these.
-    template <class Value, class OfObject>
-    std::vector<Value> united(std::size_t leader, std::size_t columns, const OfObject& values) const {
+    template <class OfObject>
+    auto united(std::size_t leader, std::size_t columns, const OfObject& values) const {
+        using Values = std::remove_cvref_t<decltype(*values(leader))>;
         const Union* set = find(leader);
-        if (!set) return *values(leader);
+        if (!set) return Values(*values(leader));
         for (const std::size_t member : set->members) {
-            if (values(member)->empty()) return {};
+            if (values(member)->empty()) return Values();
         }
-        std::vector<Value> result;
+        Values result;
         result.reserve(set->sources.size() * columns);
         for (const auto& [object, point] : set->sources) {
-            const std::vector<Value>& own = *values(object);
+            const Values& own = *values(object);
             for (std::size_t c = 0; c < columns; ++c) result.push_back(own[point * columns + c]);
         }
         return result;

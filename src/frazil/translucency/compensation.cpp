@@ -40,8 +40,7 @@ const char* compensation_name(CompensationMode mode) {
 
 void check_compensation(const Compensation& compensation, const std::string& path) {
     if (!(compensation.limit >= 1.0f && std::isfinite(compensation.limit))) {
-        throw ValueError(str(path, ": limit must be >= 1 and finite, got ", compensation.limit,
-                             ". It caps the gain; 8 is the default."));
+        throw ValueError(str(path, ": limit must be >= 1 and finite, got ", compensation.limit, ". It caps the gain."));
     }
     if (!(compensation.strength >= 0.0f && compensation.strength <= 1.0f)) {
         throw ValueError(str(path, ": strength must be in [0, 1], got ", compensation.strength, "."));

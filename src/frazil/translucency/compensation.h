@@ -24,7 +24,7 @@ const char* compensation_name(CompensationMode mode);
 
 struct Compensation {
     CompensationMode mode = CompensationMode::depth;
-    float limit = 8.0f;         // largest gain, >= 1
+    float limit = 100.0f;       // largest gain, >= 1
     float strength = 1.0f;      // 0 = off, 1 = full
     bool by_luminance = false;  // one factor for all channels, from luminances
 };

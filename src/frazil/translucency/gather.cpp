@@ -1,11 +1,13 @@
 #include <bit>
 #include <cmath>
+#include <span>
 
 #include "frazil/base/error.h"
 #include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/radix_sort.h"
 #include "frazil/translucency/gather_kernel.h"
+#include "frazil/translucency/local_expansion.h"
 #include "frazil/translucency/opening_rule.h"
 #include "frazil/translucency/point_tree_data.h"
 
@@ -13,7 +15,12 @@ namespace frazil {
 namespace {
 
 constexpr std::size_t kBlockStep = 16;
-constexpr float kWidestBlock = 4.0f;  // in mean free paths, beyond kBlockStep shading points
+constexpr float kWidestBlock = 4.0f;       // in mean free paths, beyond kBlockStep shading points
+constexpr std::size_t kChunk = 2048;       // shading points whose blocks one thread chooses
+constexpr std::size_t kBlockPoints = 128;  // at most
+// Half a block's diagonal that a source is smooth across, over the radius of a cluster that may stand for it, squared.
+constexpr float kSmooth = 0.7f;
+constexpr float kNothingIsSmooth = std::numeric_limits<float>::max();
 // Of a cluster's largest squared radius, what a single footprint may have before it is cut. Coverage on a plane is the
 // same within 3e-4 from 0.05 to 0.6, at a seventh of the time.
 constexpr float kDiscShare = 0.6f;
@@ -32,19 +39,27 @@ struct Cut {
     const PointTree::Impl& tree;
     const OpeningRule* rule;
     bool has_footprints;
-    SourceList list;
-    std::vector<std::uint32_t> stack;
-    std::vector<V2f> leans;  // of each group's power in the cell that is being cut
+    float smooth_squared =
+        0.0f;  // sources that clusters of this squared radius may stand for are smooth across the block
+    SourceList near{}, far{};
+    SourceList* list = nullptr;  // where sources go just now
+    std::vector<std::uint32_t> stack{};
+    std::vector<V2f> leans{};  // of each group's power in the cell that is being cut
 
     const PointClusters& clusters() const { return *tree.clusters; }
 
-    // One group's power of the last source, and how far its centre lies from that of the area.
-    void add_power(const float* power, float scale, const V3f& offset) {
-        Source& source = list.sources.back();
-        GroupPower& to = list.powers.emplace_back();
+    // Room for the powers of the last source, one a group.
+    GroupPower* add_powers() {
+        const std::size_t first = list->powers.size();
+        list->powers.resize(first + tree.groups);
+        return &list->powers[first];
+    }
+
+    // One group's power of a source, and how far its centre lies from that of the area.
+    static void set_power(GroupPower& to, const float* power, float scale, const V3f& offset, float* all) {
         for (int c = 0; c < 3; ++c) {
             to.power[c] = power[c] * scale;
-            source.power[c] += std::abs(to.power[c]);
+            all[c] += std::abs(to.power[c]);
         }
         to.offset = {2.0f * offset.x, 2.0f * offset.y, 2.0f * offset.z};
     }
@@ -53,14 +68,16 @@ struct Cut {
         const TreeNode& node = clusters().nodes[index];
         const NodeArea& area = clusters().areas_of_nodes[index];
         const float scale = has_footprints && node.trace > 0.0f ? 1.0f + 2.0f * node.footprint / node.trace : 1.0f;
-        Source& source = list.sources.emplace_back();
+        Source& source = list->sources.emplace_back();
         source.center = {node.center.x, node.center.y, node.center.z};
         for (int i = 0; i < 6; ++i) source.covariance[i] = area.covariance[i] * scale;
         source.trace = node.trace * scale;
         source.area = area.area;
         const float reach = lean_reach(node);
+        GroupPower* to = add_powers();
         for (std::size_t g = 0; g < tree.groups; ++g) {
-            add_power(&tree.node_powers[3 * (index * tree.groups + g)], 1.0f, tree.node_power_offset(index, g, reach));
+            set_power(to[g], &tree.node_powers[3 * (index * tree.groups + g)], 1.0f,
+                      tree.node_power_offset(index, g, reach), source.power.data());
         }
     }
 
@@ -71,19 +88,21 @@ struct Cut {
         float v = has_footprints ? share : 0.0f;
         if (squared > largest_squared && has_footprints) v *= largest_squared / squared;
         const auto& c = cell.covariance;
-        list.sources.push_back({{center.x, center.y, center.z},
-                                {v * c[0], v * c[1], v * c[2], 2.0f * v * c[3], 2.0f * v * c[4], 2.0f * v * c[5]},
-                                v * cell.trace,
-                                clusters().areas[p] * share,
-                                {0.0f, 0.0f, 0.0f}});
+        list->sources.push_back({{center.x, center.y, center.z},
+                                 {v * c[0], v * c[1], v * c[2], 2.0f * v * c[3], 2.0f * v * c[4], 2.0f * v * c[5]},
+                                 v * cell.trace,
+                                 clusters().areas[p] * share,
+                                 {0.0f, 0.0f, 0.0f}});
     }
 
     // A cell in one piece.
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared) {
         add_part(p, cell, clusters().positions[p], 1.0f, largest_squared);
+        GroupPower* to = add_powers();
         for (std::size_t g = 0; g < tree.groups; ++g) {
             const V3f offset = has_footprints ? tree.power_offset(p, g, lean_reach(cell.trace)) : V3f(0.0f);
-            add_power(&tree.irradiance[p * tree.groups + g].x, clusters().areas[p], offset);
+            set_power(to[g], &tree.irradiance[p * tree.groups + g].x, clusters().areas[p], offset,
+                      list->sources.back().power.data());
         }
     }
 
@@ -93,13 +112,15 @@ struct Cut {
         if (2.0f * cell.trace * share <= largest_squared || share < 1e-3f) {
             const V3f center = clusters().positions[p] + frame.axes[0] * z.x + frame.axes[1] * z.y;
             add_part(p, cell, center, share, largest_squared);
+            GroupPower* to = add_powers();
             for (std::size_t g = 0; g < tree.groups; ++g) {
                 const V2f& lean = leans[g];
                 const float weight = power_at(lean, z);
                 // The centre of power within the part.
                 const float within = weight > 0.25f ? share / weight : 0.0f;
-                add_power(&tree.irradiance[p * tree.groups + g].x, clusters().areas[p] * share * weight,
-                          (frame.axes[0] * lean.x + frame.axes[1] * lean.y) * within);
+                set_power(to[g], &tree.irradiance[p * tree.groups + g].x, clusters().areas[p] * share * weight,
+                          (frame.axes[0] * lean.x + frame.axes[1] * lean.y) * within,
+                          list->sources.back().power.data());
             }
             return;
         }
@@ -137,7 +158,8 @@ struct Cut {
     }
 
     void build(const Box3f& box) {
-        list.clear();
+        near.clear();
+        far.clear();
         stack.assign(1, 0);
         while (!stack.empty()) {
             const std::uint32_t index = stack.back();
@@ -147,7 +169,9 @@ struct Cut {
             const float beyond = node.radius + tree.kernel->table.reach;
             if (q > beyond * beyond) continue;
             const float squared = node.radius * node.radius + (has_footprints ? 4.0f * node.footprint : 0.0f);
-            if (squared <= rule->largest_squared(q) && (!node.is_leaf() || node.size() > 1)) {
+            const float largest = rule->largest_squared(q);
+            list = smooth_squared <= largest ? &far : &near;
+            if (squared <= largest && (!node.is_leaf() || node.size() > 1)) {
                 add_cluster(index);
             } else if (node.is_leaf()) {
                 add_points(node, box);
@@ -159,15 +183,15 @@ struct Cut {
 };
 
 // Which level of darkness a block needs: the darkest channel and shading point decide, all groups' light together.
-std::size_t darkness_level(const PointTree::Impl& tree, const BlockSums& block) {
+std::size_t darkness_level(const PointTree::Impl& tree, const SumRows& sums) {
     float darkest = 1.0f;
     for (std::size_t c = 0; c < 3; ++c) {
         float mean = 0.0f;
         for (std::size_t g = 0; g < tree.groups; ++g) mean += std::abs(tree.node_powers[3 * g + c]);
         if (!(mean > 0.0f)) continue;
         mean /= tree.clusters->areas_of_nodes[0].area;
-        for (std::size_t lane = 0; lane < block.lanes; ++lane) {
-            const float expected = mean * block.coverage[c][lane], arrives = std::abs(block.unshaded[c][lane]);
+        for (std::size_t i = 0; i < sums.size(); ++i) {
+            const float expected = mean * sums.coverage(i)[c], arrives = std::abs(sums.unshaded(i)[c]);
             if (arrives < darkest * expected) darkest = arrives / expected;
         }
     }
@@ -203,17 +227,30 @@ std::vector<KeyedIndex> sorted_positions(const PointTree::Impl& tree, const V3f*
     return keys;
 }
 
-void copy_exitance(const BlockSums& block, std::size_t lane, std::size_t groups, Rgb* to) {
-    for (std::size_t g = 0; g < groups; ++g) {
-        for (std::size_t c = 0; c < 3; ++c) to[g][c] = block.exitance[(3 * g + c) * kBlockLanes + lane];
+// How many of the first shading points, at most `most`, lie in a box whose diagonal is no longer than `widest`, at least a
+// step of them; and that box.
+std::size_t near_points(std::span<const KeyedIndex> order, const V3f* positions, float widest, std::size_t most,
+                        Box3f& box) {
+    most = std::min(most, order.size());
+    box = {};
+    std::size_t count = 0;
+    while (count < most) {
+        const std::size_t next = std::min(most, count + kBlockStep);
+        Box3f wider = box;
+        for (std::size_t i = count; i < next; ++i) wider.extendBy(positions[order[i].index]);
+        if (count > 0 && wider.size().length() > widest) break;
+        box = wider;
+        count = next;
     }
+    return count;
 }
 
 }  // namespace
 
 Gathered PointTree::gather(const V3f* positions, std::size_t count, const GatherOptions& options) const {
     if (!(options.tolerance > 0.0f && std::isfinite(options.tolerance))) {
-        throw ValueError(str("PointTree: tolerance must be > 0, got ", options.tolerance, ". 0.01 is the default."));
+        throw ValueError(str("PointTree: tolerance must be > 0, got ", options.tolerance, ". ",
+                             GatherOptions().tolerance, " is the default."));
     }
     const Impl& tree = *impl_;
     const TreeKernel& kernel = *tree.kernel;
@@ -235,56 +272,61 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     std::vector<RampHinges> hats;
     for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(kernel.ramp, k), Rgb(1.0f)));
     const auto widest = static_cast<float>(kWidestBlock * shortest_mean_free_path(kernel.profile));
-    parallel_for(order.size(), 8 * kBlockLanes, [&](std::size_t chunk_begin, std::size_t chunk_end) {
-        Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free, {}, {}, {}};
-        BlockSums block;
+    parallel_for(order.size(), kChunk, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+        Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free};
+        BlockSums lanes;
+        LocalExpansion expansion;
+        SumRows sums;
+        std::vector<V3f> places;
         std::size_t level = 0;
-        for (std::size_t begin = chunk_begin; begin < chunk_end; begin += block.lanes) {
-            // A block is up to kBlockLanes shading points that lie near each other.
-            const std::size_t most = std::min(kBlockLanes, chunk_end - begin);
+        for (std::size_t begin = chunk_begin; begin < chunk_end; begin += places.size()) {
+            // A block of shading points that lie near each other.
             Box3f box;
-            for (block.lanes = 0; block.lanes < most;) {
-                const std::size_t next = std::min(most, block.lanes + kBlockStep);
-                Box3f wider = box;
-                for (std::size_t lane = block.lanes; lane < next; ++lane) {
-                    const V3f& p = positions[order[begin + lane].index];
-                    block.x[lane] = p.x;
-                    block.y[lane] = p.y;
-                    block.z[lane] = p.z;
-                    wider.extendBy(p);
+            const std::span here(order.data() + begin, chunk_end - begin);
+            const std::size_t size = near_points(here, positions, widest, kBlockPoints, box);
+            places.clear();
+            for (std::size_t i = 0; i < size; ++i) places.push_back(positions[here[i].index]);
+            const float half = 0.5f * box.size().length();
+            cut.smooth_squared = size > LocalExpansion::kNodes ? half * half * kSmooth : kNothingIsSmooth;
+            // What is smooth across the block is summed at a few nodes, the rest at every shading point.
+            const auto sum_up = [&](const RampHinges& with) {
+                sums.reset(size, tree.groups);
+                if (!cut.far.sources.empty()) {
+                    lanes.clear(tree.groups);
+                    expansion.place(box, lanes);
+                    add_sources(kernel.table, with, cut.far, tree.groups, lanes);
+                    expansion.fit(lanes, tree.groups);
+                    expansion.eval(places, sums);
                 }
-                if (block.lanes > 0 && wider.size().length() > widest) break;
-                box = wider;
-                block.lanes = next;
-            }
-            for (std::size_t lane = block.lanes; lane < kBlockLanes; ++lane) {
-                block.x[lane] = block.x[0];
-                block.y[lane] = block.y[0];
-                block.z[lane] = block.z[0];
-            }
+                for (std::size_t at = 0; at < size; at += kBlockLanes) {
+                    if (cut.near.sources.empty()) break;
+                    lanes.clear(tree.groups);
+                    lanes.place(&places[at], std::min(kBlockLanes, size - at));
+                    add_sources(kernel.table, with, cut.near, tree.groups, lanes);
+                    sums.add(at, lanes);
+                }
+            };
             // Gather by the rule of the block before; again where it proves too lax here.
             for (;;) {
-                block.clear(tree.groups);
                 cut.rule = &rules[level];
                 cut.build(box);
-                add_sources(kernel.table, ramp, cut.list, tree.groups, block);
-                const std::size_t wanted = darkness_level(tree, block);
+                sum_up(ramp);
+                const std::size_t wanted = darkness_level(tree, sums);
                 const bool is_enough = wanted <= level;
                 level = wanted;
                 if (is_enough) break;
             }
-            for (std::size_t lane = 0; lane < block.lanes; ++lane) {
-                const std::size_t to = order[begin + lane].index;
-                for (int c = 0; c < 3; ++c) out.coverage[to][c] = block.coverage[c][lane];
-                copy_exitance(block, lane, tree.groups, &out.exitance[to * tree.groups]);
+            for (std::size_t i = 0; i < size; ++i) {
+                const std::size_t to = here[i].index;
+                std::copy_n(sums.exitance(i), 3 * tree.groups, &out.exitance[to * tree.groups].x);
+                std::copy_n(sums.coverage(i), 3, &out.coverage[to].x);
             }
             // The same cut once more for every knot of the ramp.
             for (std::size_t k = 0; k < hats.size(); ++k) {
-                block.clear(tree.groups);
-                add_sources(kernel.table, hats[k], cut.list, tree.groups, block);
-                for (std::size_t lane = 0; lane < block.lanes; ++lane) {
-                    const std::size_t to = order[begin + lane].index;
-                    copy_exitance(block, lane, tree.groups, &out.layers[(to * out.knots + k) * tree.groups]);
+                sum_up(hats[k]);
+                for (std::size_t i = 0; i < size; ++i) {
+                    Rgb* to = &out.layers[(here[i].index * out.knots + k) * tree.groups];
+                    std::copy_n(sums.exitance(i), 3 * tree.groups, &to->x);
                 }
             }
         }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "frazil/base/vec.h"
 #include "frazil/translucency/kernel_table.h"
 #include "frazil/translucency/ramp.h"
 
@@ -57,6 +58,49 @@ struct BlockSums {
         for (auto& row : unshaded) row.fill(0.0f);
         exitance.assign(3 * groups * kBlockLanes, 0.0f);
     }
+    // Take shading points, at most kBlockLanes.
+    void place(const V3f* positions, std::size_t count) {
+        lanes = count;
+        for (std::size_t lane = 0; lane < kBlockLanes; ++lane) {
+            const V3f& p = positions[lane < count ? lane : 0];
+            x[lane] = p.x;
+            y[lane] = p.y;
+            z[lane] = p.z;
+        }
+    }
+};
+
+// The sums of shading points, one row each: exitance (groups, 3), coverage (3), unshaded (3), and zeros up to the stride.
+class SumRows {
+  public:
+    void reset(std::size_t count, std::size_t groups) {
+        count_ = count;
+        row_ = 3 * groups;
+        values_.assign(count * stride(), 0.0f);
+    }
+    std::size_t size() const { return count_; }
+    std::size_t used() const { return row_ + 6; }
+    std::size_t stride() const { return (used() + 7) / 8 * 8; }
+    float* data() { return values_.data(); }
+    const float* exitance(std::size_t i) const { return &values_[i * stride()]; }
+    const float* coverage(std::size_t i) const { return exitance(i) + row_; }
+    const float* unshaded(std::size_t i) const { return coverage(i) + 3; }
+
+    // The lanes' sums join the rows from `first`.
+    void add(std::size_t first, const BlockSums& lanes) {
+        for (std::size_t lane = 0; lane < lanes.lanes; ++lane) {
+            float* to = &values_[(first + lane) * stride()];
+            for (std::size_t k = 0; k < row_; ++k) to[k] += lanes.exitance[k * kBlockLanes + lane];
+            for (std::size_t c = 0; c < 3; ++c) {
+                to[row_ + c] += lanes.coverage[c][lane];
+                to[row_ + 3 + c] += lanes.unshaded[c][lane];
+            }
+        }
+    }
+
+  private:
+    std::size_t count_ = 0, row_ = 0;
+    std::vector<float> values_;
 };
 
 // Piecewise-linear ramp as a sum of hinges: colour at 0 plus slope changes times max(0, r - distance).

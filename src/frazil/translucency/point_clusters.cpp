@@ -10,7 +10,7 @@
 namespace frazil {
 namespace {
 
-constexpr std::uint32_t kLeafPoints = 8;
+constexpr std::uint32_t kLeafPoints = 10;
 
 // By what an extent is shortened so that extent x inverse stays in half's range: cells of slivers, which are long and
 // have no area to speak of.

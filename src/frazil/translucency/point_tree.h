@@ -25,7 +25,7 @@ enum class Estimator {
 };
 
 struct GatherOptions {
-    float tolerance = 0.01f;  // relative error of a gather that clustering may make; > 0
+    float tolerance = 0.003f;  // relative error of a gather that clustering may make; > 0
     Estimator estimator = Estimator::noise_free;
     bool ramp_layers = false;  // keep S per knot of the ramp
 };

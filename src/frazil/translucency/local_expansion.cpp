@@ -1,0 +1,126 @@
+#include "frazil/translucency/local_expansion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "frazil/translucency/local_expansion.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.h.
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace frazil::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// out (rows, stride) = left (rows, inner) times right (inner, stride); stride a multiple of 8.
+void multiply_here(const float* HWY_RESTRICT left, std::size_t rows, std::size_t inner, const float* HWY_RESTRICT right,
+                   std::size_t stride, float* HWY_RESTRICT out) {
+    const hn::CappedTag<float, 8> d;
+    const std::size_t lanes = hn::Lanes(d);
+    for (std::size_t row = 0; row < rows; ++row, left += inner, out += stride) {
+        for (std::size_t at = 0; at < stride; at += lanes) {
+            auto sum = hn::Zero(d);
+            for (std::size_t k = 0; k < inner; ++k) {
+                sum = hn::MulAdd(hn::Set(d, left[k]), hn::LoadU(d, right + k * stride + at), sum);
+            }
+            hn::StoreU(sum, d, out + at);
+        }
+    }
+}
+
+}  // namespace frazil::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace frazil {
+namespace {
+
+HWY_EXPORT(multiply_here);
+
+constexpr std::size_t kNodes = LocalExpansion::kNodes, kTerms = LocalExpansion::kTerms;
+constexpr float kCorner = 0.8f;  // of half a side
+
+std::array<V3f, kNodes> make_nodes() {
+    std::array<V3f, kNodes> nodes;
+    nodes.fill(V3f(0.0f));  // where the last two stay
+    for (int i = 0; i < 8; ++i)
+        nodes[i] = V3f(i & 1 ? 1.0f : -1.0f, i & 2 ? 1.0f : -1.0f, i & 4 ? 1.0f : -1.0f) * kCorner;
+    for (int axis = 0; axis < 3; ++axis) {
+        nodes[8 + 2 * axis][axis] = 1.0f;
+        nodes[9 + 2 * axis][axis] = -1.0f;
+    }
+    return nodes;
+}
+
+template <class T>
+void terms_of(T x, T y, T z, T* out) {
+    const T terms[kTerms] = {T(1), x, y, z, x * x, y * y, z * z, x * y, x * z, y * z};
+    std::copy(terms, terms + kTerms, out);
+}
+
+// Coefficients by least squares from the values at the nodes, (kTerms, kNodes).
+std::vector<float> make_fit() {
+    const std::array<V3f, kNodes> nodes = make_nodes();
+    double terms[kNodes][kTerms], normal[kTerms][kTerms + kNodes] = {};
+    for (std::size_t j = 0; j < kNodes; ++j) terms_of<double>(nodes[j].x, nodes[j].y, nodes[j].z, terms[j]);
+    for (std::size_t a = 0; a < kTerms; ++a) {
+        for (std::size_t j = 0; j < kNodes; ++j) {
+            for (std::size_t b = 0; b < kTerms; ++b) normal[a][b] += terms[j][a] * terms[j][b];
+            normal[a][kTerms + j] = terms[j][a];
+        }
+    }
+    // Gauss-Jordan: the normal equations are positive definite.
+    for (std::size_t i = 0; i < kTerms; ++i) {
+        const double pivot = normal[i][i];
+        for (double& value : normal[i]) value /= pivot;
+        for (std::size_t row = 0; row < kTerms; ++row) {
+            const double factor = normal[row][i];
+            for (std::size_t k = 0; row != i && k < kTerms + kNodes; ++k) normal[row][k] -= factor * normal[i][k];
+        }
+    }
+    std::vector<float> fit;
+    for (const auto& row : normal) fit.insert(fit.end(), row + kTerms, row + kTerms + kNodes);
+    return fit;
+}
+
+}  // namespace
+
+void LocalExpansion::place(const Box3f& box, BlockSums& nodes) {
+    static const std::array<V3f, kNodes> places = make_nodes();
+    const V3f half = box.size() * 0.5f;
+    middle_ = box.center();
+    for (int i = 0; i < 3; ++i) per_half_[i] = half[i] > 1e-6f * half.length() ? 1.0f / half[i] : 0.0f;
+    nodes.lanes = kNodes;
+    for (std::size_t j = 0; j < kNodes; ++j) {
+        nodes.x[j] = middle_.x + half.x * places[j].x;
+        nodes.y[j] = middle_.y + half.y * places[j].y;
+        nodes.z[j] = middle_.z + half.z * places[j].z;
+    }
+}
+
+void LocalExpansion::fit(const BlockSums& nodes, std::size_t groups) {
+    static const std::vector<float> fit = make_fit();
+    values_.reset(kNodes, groups);
+    values_.add(0, nodes);
+    coefficients_.reset(kTerms, groups);
+    HWY_DYNAMIC_DISPATCH(multiply_here)
+    (fit.data(), kTerms, kNodes, values_.data(), values_.stride(), coefficients_.data());
+}
+
+void LocalExpansion::eval(const std::vector<V3f>& positions, SumRows& sums) {
+    terms_.resize(positions.size() * kTerms);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        V3f p = (positions[i] - middle_) * per_half_;
+        for (int axis = 0; axis < 3; ++axis)
+            p[axis] = std::clamp(p[axis], -1.0f, 1.0f);  // far from the origin, rounding
+        terms_of(p.x, p.y, p.z, &terms_[i * kTerms]);
+    }
+    HWY_DYNAMIC_DISPATCH(multiply_here)
+    (terms_.data(), positions.size(), kTerms, coefficients_.data(), coefficients_.stride(), sums.data());
+}
+
+}  // namespace frazil
+#endif

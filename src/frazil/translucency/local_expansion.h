@@ -1,0 +1,35 @@
+// Sums over sources as a polynomial of the place: what shading points that lie close together share.
+// Model: the sums are known at kNodes places of a box, eight corners, six on its axes, two in its middle, and between
+//   them are the least-squares polynomial of total degree two. The far side of [GreengardRokhlin1987]'s expansions, by
+//   values instead of derivatives, so that it holds for any kernel.
+// Units: metres.
+// Valid: error of third order in the box's size over the kernel's bend, as that of a cluster is; linear in the values.
+// Not: how large the box may be: gather.cpp.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "frazil/base/vec.h"
+#include "frazil/translucency/gather_kernel.h"
+
+namespace frazil {
+
+class LocalExpansion {
+  public:
+    static constexpr std::size_t kNodes = 16, kTerms = 10;
+
+    // Put the nodes into a box that holds the shading points; they become the block's lanes.
+    void place(const Box3f& box, BlockSums& nodes);
+    // Take the nodes' sums.
+    void fit(const BlockSums& nodes, std::size_t groups);
+    // The sums at places, as many as `sums` has rows.
+    void eval(const std::vector<V3f>& positions, SumRows& sums);
+
+  private:
+    V3f middle_{0.0f}, per_half_{0.0f};  // 1 over half the box's sides
+    SumRows values_, coefficients_;      // kNodes, kTerms
+    std::vector<float> terms_;
+};
+
+}  // namespace frazil
