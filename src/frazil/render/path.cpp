@@ -61,7 +61,8 @@ void PathTracer::note(const Hit& hit, const Surface& surface, float depth, const
     }
     tile.add_object(pixel, surface.object, false);
     if (layout_.mattes.empty()) return;
-    for (const std::uint32_t matte : layout_.mattes_of_object[surface.object]) tile.add_matte(pixel, matte, false, 1.0f);
+    for (const std::uint32_t matte : layout_.mattes_of_object[surface.object])
+        tile.add_matte(pixel, matte, false, 1.0f);
 }
 
 void PathTracer::trace(const FirstHit& first, float samples, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,

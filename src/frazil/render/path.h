@@ -52,7 +52,8 @@ class PathTracer {
     void note(const Hit& hit, const Surface& surface, float depth, const Sampler& sampler, std::uint32_t pixel,
               Tile& tile) const;
     // Follow a path to its end, from what it sees first; a part that is split off goes to `split`, where there is room for one.
-    void follow(Path& path, const FirstHit* first, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
+    void follow(Path& path, const FirstHit* first, const V3f* view_axis, Path* split, bool& has_split,
+                Tile& tile) const;
 
     // Radiance to the layers of the path's first lobe; to `primary` where the camera sees it directly.
     void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,

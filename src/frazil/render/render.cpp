@@ -25,7 +25,7 @@
 namespace frazil {
 namespace {
 
-constexpr int kTileSize = 16;  // pixels along a side
+constexpr int kTileSize = 16;                   // pixels along a side
 constexpr std::uint32_t kCameraDimensions = 1;  // of the sampler, pairs
 // Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
 constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
@@ -196,9 +196,7 @@ struct ShadingPlan {
           run(std::clamp(shaded / kSampleSubsets, 1, kSubsetRun)) {}
 
     // Of the first `count` samples.
-    int before(int count) const {
-        return static_cast<int>((std::int64_t(count) * shaded + samples - 1) / samples);
-    }
+    int before(int count) const { return static_cast<int>((std::int64_t(count) * shaded + samples - 1) / samples); }
     int subset(int index) const { return index / run % kSampleSubsets; }
 
     int samples, shaded;

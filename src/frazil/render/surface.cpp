@@ -249,8 +249,9 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
         for (int k = 0; k < 3; ++k) {
             corners[k] = mesh.positions[mesh.triangles[hit.triangle][k]] * object.local_to_world;
             const V2f corner(k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f);
-            normals[k] = towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
-                                 surface.geometric_normal);
+            normals[k] =
+                towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
+                        surface.geometric_normal);
         }
         const V3f place = frazil::lifted(corners, normals, hit.uv, surface.position);
         if (is_finite(place)) surface.lifted = place;

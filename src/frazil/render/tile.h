@@ -195,7 +195,7 @@ class Tile {
   private:
     std::size_t groups_, plane_count_, lpe_count_, matte_count_;
     std::vector<Rgb> light_, planes_, lpes_;
-    std::vector<float> mattes_;  // (pixels, directly or through ice, mattes)
+    std::vector<float> mattes_;                      // (pixels, directly or through ice, mattes)
     std::vector<float> luminance_, subset_samples_;  // by subset
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;
