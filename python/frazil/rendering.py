@@ -81,8 +81,8 @@ def render(
         Of the camera per pixel, 1 or more; the most, where `noise` is given.
     shading_samples : int
         About how many of a pixel's samples are shaded, each for those that see alike (one object, like normals and
-        places): the others tell what is seen. 0 shades all. The expected picture is the same; edges, depth, ids and mattes
-        have all samples.
+        places): the others tell what is seen. 0 shades all. The expected picture is the same; edges, depth, ids and
+        mattes have all samples.
     noise : float
         Standard error at which a pixel gets no more samples, relative to its luminance plus a tenth of the picture's
         mean, averaged over 5x5 pixels; 0 gives every pixel all samples. The layer ``sample_count`` tells how many.
