@@ -42,6 +42,7 @@ def render(
     *,
     resolution: tuple[int, int] = (960, 540),
     samples: int = 32,
+    shading_samples: int = 0,
     noise: float = 0.0,
     min_samples: int = 16,
     seed: int = 0,
@@ -77,7 +78,11 @@ def render(
     resolution : (int, int)
         Width and height in pixels, each from 1 to 65536.
     samples : int
-        Camera paths per pixel, 1 or more; the most, where `noise` is given.
+        Of the camera per pixel, 1 or more; the most, where `noise` is given.
+    shading_samples : int
+        About how many of a pixel's samples are shaded, each for those that see alike (one object, like normals and
+        places): the others tell what is seen. 0 shades all. The expected picture is the same; edges, depth, ids and
+        mattes have all samples.
     noise : float
         Standard error at which a pixel gets no more samples, relative to its luminance plus a tenth of the picture's
         mean, averaged over 5x5 pixels; 0 gives every pixel all samples. The layer ``sample_count`` tells how many.
@@ -161,6 +166,7 @@ def render(
         "width": resolution[0],
         "height": resolution[1],
         "samples": samples,
+        "shading_samples": shading_samples,
         "noise": noise,
         "min_samples": min_samples,
         "seed": seed,

@@ -84,3 +84,42 @@ def test_what_the_core_lacks_in_a_pixel_is_seen_through_it_after_denoising_too()
     assert chips.sum() > 30
     assert left.mean() > 0.97
     assert left.min() > 0.85
+
+
+def test_shading_fewer_samples_keeps_the_picture_and_what_is_seen(lit):
+    scene, bake = lit
+    options = {"bake": bake, "resolution": (48, 27), "mattes": {"ball": ["/Ball"]}}
+    whole = fz.render(scene, samples=64, **options)
+    seeds = [fz.render(scene, samples=64, shading_samples=8, seed=seed, **options) for seed in range(16)]
+    film = seeds[0]
+    for name in ("Z", "P", "object_id", "matte.ball"):
+        np.testing.assert_array_equal(film[name], whole[name], err_msg=name)
+    additive = film.additive_layers()
+    np.testing.assert_allclose(sum(film[n] for n in additive), film["beauty"][:, :, :3], rtol=1e-5, atol=1e-6)
+    # The mean of many seeds is the truth's, layer by layer and, within the noise, pixel by pixel.
+    truth = fz.render(scene, samples=1024, seed=99, **options)
+    for name in ("diffuse", "specular", "translucency", "background", "albedo"):
+        runs = np.array([f[name] for f in seeds])
+        spread = runs.mean(axis=(1, 2, 3)).std(ddof=1) / np.sqrt(len(runs))
+        assert abs(runs.mean() - truth[name].mean()) < 5 * spread + 2e-3 * truth[name].mean(), name
+    cheap = np.mean([(luminance(f) - luminance(truth)) ** 2 for f in seeds])
+    eighth = np.mean((luminance(fz.render(scene, samples=8, **options)) - luminance(truth)) ** 2)
+    assert cheap < 0.85 * eighth
+    # The error told is that of the samples shaded.
+    told, real = np.mean([f["variance"] for f in seeds]), np.var([luminance(f) for f in seeds], axis=0, ddof=1).mean()
+    assert 0.5 * real < told < 6.0 * real
+
+
+def test_shading_fewer_samples_has_the_same_bits_on_any_number_of_threads(lit):
+    scene, bake = lit
+    films = [
+        fz.render(scene, bake=bake, samples=32, shading_samples=5, noise=0.05, threads=n, resolution=(40, 24))
+        for n in (1, 3)
+    ]
+    for name in films[0]:
+        np.testing.assert_array_equal(films[0][name], films[1][name], err_msg=name)
+
+
+def test_shading_samples_below_zero_are_refused(lit):
+    with pytest.raises(ValueError, match="shading_samples must be >= 0"):
+        fz.render(lit[0], shading_samples=-1)

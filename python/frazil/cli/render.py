@@ -42,6 +42,9 @@ def render_command(
         float,
         typer.Option(metavar="ERROR", help="Relative standard error at which a pixel gets no more samples. 0 = off."),
     ] = 0.0,
+    shading_samples: Annotated[
+        int, typer.Option(metavar="N", help="Of a pixel's samples so many are shaded, each for those alike. 0 = all.")
+    ] = 0,
     min_samples: Annotated[int, typer.Option(metavar="N", help="Paths per pixel before --noise is asked.")] = 16,
     denoise: Annotated[
         bool, typer.Option("--denoise", help="Open Image Denoise on the ray-traced layers, each by itself.")
@@ -148,6 +151,7 @@ def render_command(
     positive("--spacing-pixels", spacing_pixels, may_be_zero=True)
     within("--samples", samples, 1, 2**24)
     within("--min-samples", min_samples, 1, 2**24)
+    within("--shading-samples", shading_samples, 0, 2**24)
     positive("--noise", noise, may_be_zero=True)
     if checkpoint is not None:
         positive("--checkpoint", checkpoint, may_be_zero=True)
@@ -177,6 +181,7 @@ def render_command(
     options: dict[str, Any] = {
         "samples": samples,
         "noise": noise,
+        "shading_samples": shading_samples,
         "min_samples": min_samples,
         "denoise": denoise,
         "bake_cache": bake_cache,

@@ -189,6 +189,7 @@ void bind_options(nb::module_& module) {
         .def_rw("height", &RenderOptions::height)
         .def_rw("samples", &RenderOptions::samples)
         .def_rw("noise", &RenderOptions::noise)
+        .def_rw("shading_samples", &RenderOptions::shading_samples)
         .def_rw("min_samples", &RenderOptions::min_samples)
         .def_rw("seed", &RenderOptions::seed)
         .def_rw("threads", &RenderOptions::threads)

@@ -35,20 +35,19 @@ float cryptomatte_id(std::string_view name) {
     return std::bit_cast<float>(bits);
 }
 
-void count_id(IdCounts& counts, std::uint32_t object) {
+void count_id(IdCounts& counts, std::uint32_t object, float samples) {
     for (auto& [known, count] : counts) {
         if (known == object) {
-            ++count;
+            count += samples;
             return;
         }
     }
-    counts.emplace_back(object, 1u);
+    counts.emplace_back(object, samples);
 }
 
 void add_ids(const IdCounts& counts, std::span<const float> id_of_object, float* slots) {
-    for (const auto& [object, count] : counts) {
+    for (const auto& [object, samples] : counts) {
         const float id = id_of_object[object];
-        const auto samples = static_cast<float>(count);
         int place = 0;
         for (int i = 0; i < kIdSlots; ++i) {
             if (slots[2 * i] == id && slots[2 * i + 1] > 0.0f) {

@@ -24,8 +24,8 @@ std::uint32_t murmur3_32(std::string_view text);
 float cryptomatte_id(std::string_view name);
 
 // How many samples of a pixel showed which object.
-using IdCounts = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
-void count_id(IdCounts& counts, std::uint32_t object);
+using IdCounts = std::vector<std::pair<std::uint32_t, float>>;
+void count_id(IdCounts& counts, std::uint32_t object, float samples = 1.0f);
 
 // Add a pass's counts to a pixel's slots: kIdSlots pairs of id and number of samples, 0 and 0 where empty.
 void add_ids(const IdCounts& counts, std::span<const float> id_of_object, float* slots);

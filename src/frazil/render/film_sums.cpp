@@ -55,6 +55,7 @@ FilmSums::FilmSums(int width, int height, const FilmLayout& layout) : layout_(la
     std::fill(depth_, depth_ + count, std::numeric_limits<float>::infinity());
     samples_.assign(count, 0.0f);
     subsets_.assign(count * kSampleSubsets, 0.0f);
+    subset_samples_.assign(count * kSampleSubsets, 0.0f);
 }
 
 float* FilmSums::add_layer(const std::string& name, std::size_t channels) {
@@ -110,6 +111,7 @@ void FilmSums::add(const Tile& tile, std::size_t tile_pixel, std::size_t film_pi
     }
     for (int subset = 0; subset < kSampleSubsets; ++subset) {
         subsets_[film_pixel * kSampleSubsets + subset] += tile.subset_luminance(tile_pixel, subset);
+        subset_samples_[film_pixel * kSampleSubsets + subset] += tile.subset_samples(tile_pixel, subset);
     }
     increase(normal_, film_pixel, tile.normal(tile_pixel));
     increase(albedo_, film_pixel, tile.albedo(tile_pixel));
@@ -154,15 +156,12 @@ float FilmSums::luminance_of_mean(std::size_t film_pixel) const {
 
 // The squared standard error of the mean: the variance of the subsets' means over their number.
 float FilmSums::variance_of_mean(std::size_t film_pixel) const {
-    const auto samples = static_cast<int>(samples_[film_pixel]);
-    constexpr int kRound = kSampleSubsets * kSubsetRun;
-    if (samples <= kRound - kSubsetRun) return std::numeric_limits<float>::infinity();
     std::array<float, kSampleSubsets> means;
     float mean = 0.0f, squares = 0.0f;
     for (int subset = 0; subset < kSampleSubsets; ++subset) {
-        const int own =
-            samples / kRound * kSubsetRun + std::clamp(samples % kRound - subset * kSubsetRun, 0, kSubsetRun);
-        means[subset] = subsets_[film_pixel * kSampleSubsets + subset] / static_cast<float>(own);
+        const float own = subset_samples_[film_pixel * kSampleSubsets + subset];
+        if (own == 0.0f) return std::numeric_limits<float>::infinity();
+        means[subset] = subsets_[film_pixel * kSampleSubsets + subset] / own;
         mean += means[subset] / kSampleSubsets;
     }
     for (const float value : means) squares += (value - mean) * (value - mean);
@@ -263,6 +262,7 @@ FilmState FilmSums::state() {
     for (std::size_t i = 0; i < id_slots_.size(); ++i) result["ids." + layout_.ids[i].aov] = id_slots_[i];
     result["samples"] = samples_;
     result["subsets"] = subsets_;
+    result["subset_samples"] = subset_samples_;
     return result;
 }
 

@@ -64,7 +64,8 @@ class FilmSums {
         *bent_normal_;  // null where not asked for
     float *beauty_, *depth_, *object_id_, *normal_, *position_, *coverage_, *albedo_, *sample_count_, *variance_;
     std::vector<float> samples_;  // per pixel; exact up to 2^24
-    std::vector<float> subsets_;  // (pixels, kSampleSubsets): sums of the beauty's luminance
+    // (pixels, kSampleSubsets): sums of the beauty's luminance, and the samples that they stand for.
+    std::vector<float> subsets_, subset_samples_;
 };
 
 }  // namespace frazil

@@ -140,7 +140,7 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
                 const Rgb& total = body.total_reflectance;
                 Rgb lacking(0.0f);
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
-                tile.add_coverage(request.pixel, coverage, lacking);
+                tile.add_coverage(request.pixel, coverage * request.samples, lacking * request.samples);
             }
             add_overlays(request, &gathered.exitance[row * gathered.groups], gathered.groups, gain, fill, tile);
             if (request.is_primary && body.overlay_tree) {

@@ -13,6 +13,7 @@ void check_options(const RenderOptions& options) {
     require(options.width >= 1 && options.width <= 65536, "width must be in 1..65536", options.width);
     require(options.height >= 1 && options.height <= 65536, "height must be in 1..65536", options.height);
     require(options.samples >= 1, "samples must be >= 1", options.samples);
+    require(options.shading_samples >= 0, "shading_samples must be >= 0", options.shading_samples);
     require(std::isfinite(options.noise) && options.noise >= 0.0f, "noise must be >= 0", options.noise);
     require(options.min_samples >= 1, "min_samples must be >= 1", options.min_samples);
     require(options.bake_samples >= 1, "bake_samples must be >= 1", options.bake_samples);

@@ -14,7 +14,9 @@ namespace frazil {
 
 struct RenderOptions {
     int width = 960, height = 540;
-    int samples = 32;      // per pixel; the most, where `noise` may end earlier
+    int samples = 32;  // per pixel; the most, where `noise` may end earlier
+    // Of a pixel's samples, about how many are shaded, each for those that see alike; the others tell what is seen. 0 = all.
+    int shading_samples = 0;
     float noise = 0.0f;    // standard error at which a pixel needs no more samples, relative (FilmSums); 0 = off
     int min_samples = 16;  // per pixel, before `noise` is asked
     std::uint32_t seed = 0;

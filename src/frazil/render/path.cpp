@@ -26,40 +26,88 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
       camera_inside_(interiors_.inside_at(V3f(0.0f) * scene.camera.camera_to_world)),
       max_bounces_(max_bounces),
       pixel_(pixel),
-      motion_(motion) {}
+      motion_(motion) {
+    for (const Object& object : scene.objects) {
+        const auto* standard = std::get_if<StandardMaterial>(&scene.materials[object.material].model);
+        may_let_pass_.push_back(standard && (standard->opacity.lookup.texture || standard->opacity.value < 1.0f));
+    }
+}
 
-void PathTracer::trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
+FirstHit PathTracer::see(const Ray& camera_ray, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
+                         Tile& tile) const {
+    FirstHit first;
+    first.ray = camera_ray;
+    ++tile.rays;
+    first.is_hit = ray_scene_.intersect(camera_ray, first.hit);
+    if (!first.is_hit || !camera_inside_.is_empty() || may_let_pass_[first.hit.placement]) return first;
+    const Surface surface = resolver_.glimpse(first.hit, camera_ray.direction);
+    first.position = surface.position;
+    first.normal = surface.normal;
+    first.footprint = pixel_.radius + pixel_.spread * first.hit.t;
+    note(first.hit, surface, (surface.position - camera_ray.origin).dot(view_axis), sampler, pixel, tile);
+    first.is_noted = true;
+    return first;
+}
+
+// What a sample shows first, as far as shading has no part in it.
+void PathTracer::note(const Hit& hit, const Surface& surface, float depth, const Sampler& sampler, std::uint32_t pixel,
+                      Tile& tile) const {
+    tile.add_primary(pixel, {depth, surface.position, surface.object + 1, surface.st, surface.local_position,
+                             motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
+    if (tile.keeps_places) {
+        Sampler own = sampler;
+        own.set_dimension(kOpennessDimensions);
+        tile.places.push_back({pixel, surface.object, surface.position, surface.geometric_normal, own.next_2d()});
+    }
+    tile.add_object(pixel, surface.object, false);
+    if (layout_.mattes.empty()) return;
+    for (const std::uint32_t matte : layout_.mattes_of_object[surface.object])
+        tile.add_matte(pixel, matte, false, 1.0f);
+}
+
+void PathTracer::trace(const FirstHit& first, float samples, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                        Tile& tile) const {
     Path path;
     path.pixel = pixel;
-    path.ray = camera_ray;
-    path.receiver.position = camera_ray.origin;
+    path.samples = samples;
+    path.ray = first.ray;
+    path.receiver.position = first.ray.origin;
     path.sampler = sampler;
-    path.last.refraction = Rgb(1.0f);
+    path.last.refraction = Rgb(samples);
     path.width = pixel_.radius;
     path.spread = pixel_.spread;
-    if (!layout_.lpes.empty()) path.lpe.begin(layout_.lpes);
+    if (!layout_.lpes.empty()) {
+        path.lpe.begin(layout_.lpes);
+        path.lpe.scale(Rgb(samples));
+    }
     path.inside = camera_inside_;
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
-        camera.position = camera_ray.origin;
+        camera.position = first.ray.origin;
         path.core = core_at(camera, body, true);
         path.core.is_primary = true;
         path.volume = bodies_[std::size_t(body)]->material->volume;
     }
     Path refracted;
     bool has_split = false;
-    follow(path, &view_axis, &refracted, has_split, tile);
+    follow(path, &first, &view_axis, &refracted, has_split, tile);
     bool has_none = false;
-    if (has_split) follow(refracted, nullptr, nullptr, has_none, tile);
+    if (has_split) follow(refracted, nullptr, nullptr, nullptr, has_none, tile);
 }
 
-void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const {
+void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis, Path* split, bool& has_split,
+                        Tile& tile) const {
     const V3f eye = path.ray.origin;
     while (true) {
         Hit hit;
-        ++tile.rays;
-        const bool is_hit = ray_scene_.intersect(path.ray, hit);
+        bool is_hit = false, is_noted = false;
+        if (first) {
+            hit = first->hit, is_hit = first->is_hit, is_noted = first->is_noted;
+            first = nullptr;
+        } else {
+            ++tile.rays;
+            is_hit = ray_scene_.intersect(path.ray, hit);
+        }
         float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
         path.begin_vertex();
         V3f sheet_normal;
@@ -85,22 +133,10 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         surface.covering.roughness = blurred_roughness(surface.covering.roughness, blur);
         const auto note_primary = [&](const Rgb& albedo) {
             if (!view_axis) return;
-            const float depth = (surface.position - eye).dot(*view_axis);
-            tile.add_primary(path.pixel,
-                             {depth, surface.position, surface.normal, albedo, surface.object + 1, surface.st,
-                              surface.local_position, motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
-            if (tile.keeps_places) {
-                Sampler own = path.sampler;
-                own.set_dimension(kOpennessDimensions);
-                tile.places.push_back(
-                    {path.pixel, surface.object, surface.position, surface.geometric_normal, own.next_2d()});
+            if (!is_noted) {
+                note(hit, surface, (surface.position - eye).dot(*view_axis), path.sampler, path.pixel, tile);
             }
-            tile.add_object(path.pixel, surface.object, false);
-            if (!layout_.mattes.empty()) {
-                for (const std::uint32_t matte : layout_.mattes_of_object[surface.object]) {
-                    tile.add_matte(path.pixel, matte, false, 1.0f);
-                }
-            }
+            tile.add_shaded(path.pixel, surface.normal, albedo, path.samples);
             view_axis = nullptr;
         };
         const Body* body = bodies_[surface.object].get();
@@ -138,7 +174,7 @@ void PathTracer::follow(Path& path, const V3f* view_axis, Path* split, bool& has
         if (!is_open || crossing.to == InsideOf::kNone) add_matte(path, surface.object, Rgb(1.0f), tile);
         if (path.bounce > 0 && path.scattered == 0 && !path.has_shown) {
             path.has_shown = true;
-            tile.add_object(path.pixel, surface.object, true);
+            tile.add_object(path.pixel, surface.object, true, path.samples);
         }
 
         add_own_light(path, surface, shader, tile);
@@ -217,11 +253,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
 
     // Russian roulette on what the path may still bring.
     if (path.scattered > kBouncesBeforeRoulette) {
-        const Scattering w = path.weights();
-        if (!path.survives(
-                std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)}))) {
-            return false;
-        }
+        if (!path.survives(path.worth())) return false;
     }
     path.leave_from(surface.lifted, surface.geometric_normal, wi);
     if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {

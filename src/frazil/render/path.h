@@ -16,6 +16,7 @@
 #include "frazil/lighting/light_sampling.h"
 #include "frazil/render/bodies.h"
 #include "frazil/render/film_layout.h"
+#include "frazil/render/first_hits.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/lpe_tracks.h"
 #include "frazil/render/motion.h"
@@ -37,15 +38,22 @@ class PathTracer {
                const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
                const MotionVectors* motion = nullptr);
 
-    // Trace one sample. `sampler` stands after the camera's own dimensions.
-    void trace(const Ray& camera_ray, const V3f& view_axis, Sampler sampler, std::uint32_t pixel, Tile& tile) const;
+    // What a sample sees first; noted in the tile where that is certain before it is shaded.
+    FirstHit see(const Ray& camera_ray, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
+                 Tile& tile) const;
+    // Shade one sample, for as many as it stands for. `sampler` stands after the camera's own dimensions.
+    void trace(const FirstHit& first, float samples, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
+               Tile& tile) const;
 
     // Each begins with an object's path.
     const std::vector<std::string>& warnings() const { return interiors_.warnings(); }
 
   private:
-    // Follow a path to its end; a part that is split off goes to `split`, where there is room for one.
-    void follow(Path& path, const V3f* view_axis, Path* split, bool& has_split, Tile& tile) const;
+    void note(const Hit& hit, const Surface& surface, float depth, const Sampler& sampler, std::uint32_t pixel,
+              Tile& tile) const;
+    // Follow a path to its end, from what it sees first; a part that is split off goes to `split`, where there is room for one.
+    void follow(Path& path, const FirstHit* first, const V3f* view_axis, Path* split, bool& has_split,
+                Tile& tile) const;
 
     // Radiance to the layers of the path's first lobe; to `primary` where the camera sees it directly.
     void deliver(const Path& path, Component primary, const Scattering& weights, std::size_t group, const Rgb& radiance,
@@ -92,6 +100,7 @@ class PathTracer {
     Interiors interiors_;
     SingleScattering single_scattering_;
     InsideOf camera_inside_;
+    std::vector<std::uint8_t> may_let_pass_;  // by object: a first hit that may be gone through
     int max_bounces_;
     PixelCone pixel_;
     const MotionVectors* motion_;

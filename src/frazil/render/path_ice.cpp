@@ -98,8 +98,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
     path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
     path.clear = path.core_share = 1.0f;
     path.tint = Rgb(1.0f);
-    const Scattering w = path.weights();
-    const float left = std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)});
+    const float left = path.worth();
     return left > 0.0f && path.survives(left / kFaint);
 }
 
@@ -182,6 +181,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.position = core.position;
     request.normal = core.normal;
     request.is_primary = core.is_primary;
+    request.samples = path.samples;
     request.entering = core.entering;
     request.entering_group = core.entering_group;
     Scattering weights = path.weights();

@@ -69,6 +69,7 @@ struct IceCore {
 // The state of a path between two vertices.
 struct Path {
     std::uint32_t pixel = 0, vertex = 0;
+    float samples = 1.0f;  // of the camera that it stands for: its weights are so many times as large
     Ray ray;
     Sampler sampler{0, 0, 0};
     int bounce = 0;     // lobes that it was scattered by so far
@@ -132,6 +133,12 @@ struct Path {
     void scale(const Rgb& factor) {
         last.scale(factor);
         lpe.scale(factor);
+    }
+
+    // What one of its samples may still bring, at most.
+    float worth() const {
+        const Scattering w = weights();
+        return std::max({max_component(w.diffuse), max_component(w.specular), max_component(w.refraction)}) / samples;
     }
 
     // Go on with the given chance; false where the path ends.

@@ -25,7 +25,8 @@
 namespace frazil {
 namespace {
 
-constexpr int kTileSize = 16;  // pixels along a side
+constexpr int kTileSize = 16;                   // pixels along a side
+constexpr std::uint32_t kCameraDimensions = 1;  // of the sampler, pairs
 // Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
 constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
 // Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter.
@@ -186,25 +187,66 @@ class CheckpointClock {
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+// How many of a pixel's samples are shaded, and which subset they count in.
+struct ShadingPlan {
+    explicit ShadingPlan(const RenderOptions& options)
+        : samples(options.samples),
+          shaded(options.shading_samples),
+          is_decoupled(shaded > 0 && shaded < samples),
+          run(std::clamp(shaded / kSampleSubsets, 1, kSubsetRun)) {}
+
+    // Of the first `count` samples.
+    int before(int count) const { return static_cast<int>((std::int64_t(count) * shaded + samples - 1) / samples); }
+    int subset(int index) const { return index / run % kSampleSubsets; }
+
+    int samples, shaded;
+    bool is_decoupled;
+    int run;
+};
+
 // Trace and gather what this pass wants of a tile.
 void render_tile(const Scene& scene, const RenderOptions& options, const PathTracer& tracer, const Gathering& gathering,
                  const V3f& view_axis, const FilterSampler& filter, const Canvas& canvas, std::size_t index,
                  Tile& tile) {
     const Canvas::Region r = canvas.region(index);
     const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
+    const ShadingPlan plan(options);
+    thread_local std::vector<FirstHit> hits;
+    thread_local std::vector<Sampler> samplers;
+    thread_local std::vector<ShadedSample> shaded;
     for (int y = r.y0; y < r.y1; ++y) {
         for (int x = r.x0; x < r.x1; ++x) {
             const auto tile_pixel = static_cast<std::uint32_t>((y - r.y0) * kTileSize + x - r.x0);
             const auto film_pixel = static_cast<std::uint32_t>(canvas.film_pixel(x, y));
             const auto [first, last] = canvas.samples(film_pixel);
+            hits.clear(), samplers.clear();
             for (int sample = first; sample < last; ++sample) {
-                Sampler sampler(options.seed, film_pixel, static_cast<std::uint32_t>(sample));
+                Sampler& sampler = samplers.emplace_back(options.seed, film_pixel, static_cast<std::uint32_t>(sample));
                 const V2f u = sampler.next_2d();
                 const float image_x = (x + 0.5f + filter.offset(u.x)) / options.width;
                 const float image_y = (y + 0.5f + filter.offset(u.y)) / options.height;
-                tile.subset = subset_of(sample);
                 ++tile.camera_rays;
-                tracer.trace(camera_ray(scene.camera, image_x, image_y, aspect), view_axis, sampler, tile_pixel, tile);
+                hits.push_back(tracer.see(camera_ray(scene.camera, image_x, image_y, aspect), view_axis, sampler,
+                                          tile_pixel, tile));
+            }
+            if (!plan.is_decoupled) {
+                for (int k = 0; k < last - first; ++k) {
+                    tile.begin_shaded(tile_pixel, subset_of(first + k), 1.0f);
+                    tracer.trace(hits[k], 1.0f, view_axis, samplers[k], tile_pixel, tile);
+                }
+                continue;
+            }
+            const int begin = plan.before(first), end = plan.before(last);
+            choose_shaded(hits, end - begin, hash(options.seed, film_pixel, std::uint32_t(first)), shaded);
+            for (int k = 0; k < static_cast<int>(shaded.size()); ++k) {
+                // Numbers of their own sequence, so that what is shaded is stratified; more than planned take those that
+                // no pass plans.
+                const int index = k < end - begin ? begin + k : options.samples + first + k;
+                Sampler sampler(options.seed, film_pixel, static_cast<std::uint32_t>(index));
+                sampler.set_dimension(kCameraDimensions);
+                const auto [sample, weight] = shaded[k];
+                tile.begin_shaded(tile_pixel, plan.subset(k < end - begin ? index : k), weight);
+                tracer.trace(hits[sample], weight, view_axis, sampler, tile_pixel, tile);
             }
         }
     }

@@ -209,10 +209,9 @@ V3f SurfaceResolver::position(const Hit& hit) const {
     return at_hit(mesh.positions, mesh.triangles[hit.triangle], hit.uv) * object.local_to_world;
 }
 
-Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float footprint, bool with_bump) const {
+bool SurfaceResolver::place(const Hit& hit, const V3f& direction, Surface& surface) const {
     const Object& object = scene_.objects[hit.placement];
     const Mesh& mesh = scene_.meshes[object.mesh];
-    Surface surface;
     surface.object = hit.placement;
     surface.material = &scene_.materials[object.material];
 
@@ -220,33 +219,48 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     const V3f local = at_hit(mesh.positions, triangle, hit.uv);
     surface.local_position = mesh.rest.empty() ? local : at_hit(mesh.rest, triangle, hit.uv);
     surface.position = surface.lifted = local * object.local_to_world;
+    if (!mesh.uvs.is_empty()) surface.st = mesh.uvs.at(mesh.triangles, hit.triangle, hit.uv);
 
     const V3f wo = -direction;
     surface.geometric_normal = towards(hit.geometric_normal, wo);
     surface.normal = surface.geometric_normal;
-    if (!mesh.normals.is_empty()) {
+    if (mesh.normals.is_empty()) return false;
+    const M44f& world_to_local = frames_[hit.placement].world_to_local;
+    const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local);
+    if (!is_finite(normal) || !(normal.length2() > 0.0f)) return false;
+    surface.normal = bent_towards_viewer(towards(normal, surface.geometric_normal), wo);
+    return true;
+}
+
+Surface SurfaceResolver::glimpse(const Hit& hit, const V3f& direction) const {
+    Surface surface;
+    place(hit, direction, surface);
+    return surface;
+}
+
+Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float footprint, bool with_bump) const {
+    const Object& object = scene_.objects[hit.placement];
+    const Mesh& mesh = scene_.meshes[object.mesh];
+    const V3f wo = -direction;
+    Surface surface;
+    if (place(hit, direction, surface)) {
         const M44f& world_to_local = frames_[hit.placement].world_to_local;
-        const V3f normal = transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, hit.uv), world_to_local);
-        if (is_finite(normal) && normal.length2() > 0.0f) {
-            surface.normal = bent_towards_viewer(towards(normal, surface.geometric_normal), wo);
-            V3f corners[3], normals[3];
-            for (int k = 0; k < 3; ++k) {
-                corners[k] = mesh.positions[triangle[k]] * object.local_to_world;
-                const V2f corner(k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f);
-                normals[k] =
-                    towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
-                            surface.geometric_normal);
-            }
-            const V3f place = lifted(corners, normals, hit.uv, surface.position);
-            if (is_finite(place)) surface.lifted = place;
-            if (footprint > 0.0f) {
-                const float spread = spread_of_normals(corners, normals, surface.geometric_normal, wo, footprint);
-                if (std::isfinite(spread)) surface.normal_spread = spread;
-            }
+        V3f corners[3], normals[3];
+        for (int k = 0; k < 3; ++k) {
+            corners[k] = mesh.positions[mesh.triangles[hit.triangle][k]] * object.local_to_world;
+            const V2f corner(k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f);
+            normals[k] =
+                towards(transform_normal(mesh.normals.at(mesh.triangles, hit.triangle, corner), world_to_local),
+                        surface.geometric_normal);
+        }
+        const V3f place = frazil::lifted(corners, normals, hit.uv, surface.position);
+        if (is_finite(place)) surface.lifted = place;
+        if (footprint > 0.0f) {
+            const float spread = spread_of_normals(corners, normals, surface.geometric_normal, wo, footprint);
+            if (std::isfinite(spread)) surface.normal_spread = spread;
         }
     }
     surface.horizon = surface.normal;
-    if (!mesh.uvs.is_empty()) surface.st = mesh.uvs.at(mesh.triangles, hit.triangle, hit.uv);
     if (!mesh.colors.is_empty()) surface.display_color = mesh.colors.at(mesh.triangles, hit.triangle, hit.uv);
 
     const auto* ice = std::get_if<IceMaterial>(&surface.material->model);

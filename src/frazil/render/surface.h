@@ -43,6 +43,10 @@ class SurfaceResolver {
     // normal map are left out where the surface only lets light pass.
     Surface resolve(const Hit& hit, const V3f& direction, float footprint = 0.0f, bool with_bump = false) const;
 
+    // What a hit shows before it is shaded: place, smooth normals and texture coordinates, as resolve gives them; the rest
+    // is left out.
+    Surface glimpse(const Hit& hit, const V3f& direction) const;
+
     // Where a hit lies, in world space: the position that resolve gives it.
     V3f position(const Hit& hit) const;
 
@@ -62,6 +66,8 @@ class SurfaceResolver {
     struct Frames {
         M44f world_to_local, world_to_rest, rest_to_world;
     };
+    // True where vertices have normals that hold there.
+    bool place(const Hit& hit, const V3f& direction, Surface& surface) const;
     Covering covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump) const;
     // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
     TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,

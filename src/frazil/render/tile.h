@@ -30,8 +30,7 @@ inline int subset_of(int sample) {
 // What the camera sees first along one sample.
 struct PrimaryHit {
     float depth = std::numeric_limits<float>::infinity();
-    V3f position = V3f(0.0f), normal = V3f(0.0f);
-    Rgb albedo = Rgb(0.0f);
+    V3f position = V3f(0.0f);
     std::uint32_t object_id = 0;
     V2f st = V2f(0.0f);
     V3f local_position = V3f(0.0f);
@@ -44,6 +43,7 @@ struct GatherRequest {
     std::uint32_t pixel = 0;
     int subset = 0;                                // of the pixel's samples
     bool is_primary = false;                       // seen by the camera itself
+    float samples = 1.0f;                          // of the camera that the request stands for
     V3f position = V3f(0.0f), normal = V3f(0.0f);  // as in IceCore
     // Radiance per exitance, by the layer that it goes to: the primary ice's is translucency, further light goes the way of
     // its first lobe.
@@ -86,6 +86,7 @@ class Tile {
           lpes_(pixels * lpes, Rgb(0.0f)),
           mattes_(2 * pixels * mattes, 0.0f),
           luminance_(pixels * kSampleSubsets),
+          subset_samples_(pixels * kSampleSubsets, 0.0f),
           normal_(pixels, V3f(0.0f)),
           albedo_(pixels, Rgb(0.0f)),
           coverage_(pixels, Rgb(0.0f)),
@@ -95,6 +96,12 @@ class Tile {
           openness_(pixels, 0.0f),
           open_directions_(pixels, V3f(0.0f)),
           objects_(2 * pixels) {}
+
+    // The next light is of a shaded sample that stands for so many of the camera.
+    void begin_shaded(std::size_t pixel, int of_subset, float samples) {
+        subset = of_subset;
+        subset_samples_[pixel * kSampleSubsets + std::size_t(of_subset)] += samples;
+    }
 
     void add(std::size_t pixel, Component component, std::size_t group, const Rgb& radiance) {
         if (!is_finite(radiance)) {
@@ -118,16 +125,20 @@ class Tile {
         if (std::isfinite(weight)) mattes_[(2 * pixel + (seen_through ? 1 : 0)) * matte_count_ + matte] += weight;
     }
 
-    // What a sample shows first; `seen_through` ice or directly.
-    void add_object(std::size_t pixel, std::uint32_t object, bool seen_through) {
-        count_id(objects_[seen_through ? hits_.size() + pixel : pixel], object);
+    // What samples show first; `seen_through` ice or directly.
+    void add_object(std::size_t pixel, std::uint32_t object, bool seen_through, float samples = 1.0f) {
+        count_id(objects_[seen_through ? hits_.size() + pixel : pixel], object, samples);
     }
 
     void add_primary(std::size_t pixel, const PrimaryHit& hit) {
-        normal_[pixel] += hit.normal;
-        albedo_[pixel] += hit.albedo;
         ++hits_[pixel];
         if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
+    }
+
+    // What shading finds where a sample sees a surface, for as many samples as it stands for.
+    void add_shaded(std::size_t pixel, const V3f& normal, const Rgb& albedo, float samples) {
+        normal_[pixel] += normal * samples;
+        albedo_[pixel] += albedo * samples;
     }
 
     // Where a sample shows nothing.
@@ -151,6 +162,9 @@ class Tile {
     }
     float subset_luminance(std::size_t pixel, int of_subset) const {
         return luminance_[pixel * kSampleSubsets + of_subset];
+    }
+    float subset_samples(std::size_t pixel, int of_subset) const {
+        return subset_samples_[pixel * kSampleSubsets + of_subset];
     }
     const Rgb& albedo(std::size_t pixel) const { return albedo_[pixel]; }
     // One value per light group.
@@ -181,8 +195,8 @@ class Tile {
   private:
     std::size_t groups_, plane_count_, lpe_count_, matte_count_;
     std::vector<Rgb> light_, planes_, lpes_;
-    std::vector<float> mattes_;  // (pixels, directly or through ice, mattes)
-    std::vector<float> luminance_;
+    std::vector<float> mattes_;                      // (pixels, directly or through ice, mattes)
+    std::vector<float> luminance_, subset_samples_;  // by subset
     std::vector<V3f> normal_;
     std::vector<Rgb> albedo_;
     std::vector<Rgb> coverage_, lacking_;
