@@ -170,12 +170,21 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice: without and with the light that it scatters once, and that in clouds of bubbles."""
-    clouds = fz.Density(contrast=1.3, size=0.35, octaves=4, absorption=0.0, seed=2)
+    """Fresh breath ice before dark rock, lit from behind: without and with the light that it scatters once, and that in
+    clouds of bubbles."""
+    clouds = fz.Density(contrast=1.6, size=0.22, octaves=4, absorption=0.0, seed=2)
+    wall = np.array([[-9, -1, -3], [9, -1, -3], [9, 6, -3], [-9, 6, -3]], np.float32)
+    rock = fz.StandardMaterial(diffuse_color=(0.02, 0.022, 0.026), roughness=0.6, ior=1.5)
     pictures = []
     for volume, density in ((0.0, fz.Density()), (1.0, fz.Density()), (1.0, clouds)):
         scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
-        ice = fz.ice_preset("fresh_breath", age=0.35, depth=4.0, spacing=0.03, volume=volume, density=density)
+        mesh = scene.add_mesh(fz.Mesh(wall, np.array([[0, 1, 2], [0, 2, 3]], np.int32)), "/wall")
+        scene.add_object("/wall", mesh, scene.add_material("/rock", rock))
+        lamp = fz.RectLight(0.5, 0.5)
+        scene.add_light(
+            fz.Light(lamp, matrix=frame((-1.6, 1.5, -1.6), (0, 0.5, 0)), radiance=(60, 54, 46), path="/rim", group="rim")
+        )
+        ice = fz.ice_preset("fresh_breath", age=0.1, depth=2.0, spacing=0.03, volume=volume, density=density)
         add_shard(scene, ice)
         pictures.append(picture(scene, size, size, samples))
     return np.concatenate(pictures, 1)
