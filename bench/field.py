@@ -3,8 +3,8 @@
     python examples/ice_field.py -o out/ice_field.usdc --count 500
     python bench/field.py out/ice_field.usdc [--spacing 0.005] [--bake-samples 8] [--bounces 4]
 
-The peak is the operating system's (ru_maxrss). Rays of the bake grow with the points in effect: 88 million with two bake
-samples and one bounce take some 1,400 s of processor time.
+The peak is the operating system's (ru_maxrss). Rays of the bake grow with the points in effect: 88 million with two
+bake samples and one bounce take some 1,400 s of processor time.
 """
 
 from __future__ import annotations

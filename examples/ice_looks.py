@@ -170,8 +170,8 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice before dark rock, lit from behind: without and with the light that it scatters once, and that in
-    clouds of bubbles."""
+    """Fresh breath ice before dark rock, lit from behind: without the light that it scatters once, with it, and with it
+    in clouds of bubbles."""
     clouds = fz.Density(contrast=1.6, size=0.22, octaves=4, absorption=0.0, seed=2)
     wall = np.array([[-9, -1, -3], [9, -1, -3], [9, 6, -3], [-9, 6, -3]], np.float32)
     rock = fz.StandardMaterial(diffuse_color=(0.02, 0.022, 0.026), roughness=0.6, ior=1.5)
@@ -182,7 +182,9 @@ def breath(size: int, samples: int) -> np.ndarray:
         scene.add_object("/wall", mesh, scene.add_material("/rock", rock))
         lamp = fz.RectLight(0.5, 0.5)
         scene.add_light(
-            fz.Light(lamp, matrix=frame((-1.6, 1.5, -1.6), (0, 0.5, 0)), radiance=(60, 54, 46), path="/rim", group="rim")
+            fz.Light(
+                lamp, matrix=frame((-1.6, 1.5, -1.6), (0, 0.5, 0)), radiance=(60, 54, 46), path="/rim", group="rim"
+            )
         )
         ice = fz.ice_preset("fresh_breath", age=0.1, depth=2.0, spacing=0.03, volume=volume, density=density)
         add_shard(scene, ice)
