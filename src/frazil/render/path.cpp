@@ -33,20 +33,23 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
     }
 }
 
-FirstHit PathTracer::see(const Ray& camera_ray, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
-                         Tile& tile) const {
+FirstHit PathTracer::see(const Ray& camera_ray, Tile& tile) const {
     FirstHit first;
     first.ray = camera_ray;
     ++tile.rays;
     first.is_hit = ray_scene_.intersect(camera_ray, first.hit);
-    if (!first.is_hit || !camera_inside_.is_empty() || may_let_pass_[first.hit.placement]) return first;
-    const Surface surface = resolver_.glimpse(first.hit, camera_ray.direction);
+    return first;
+}
+
+void PathTracer::note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
+                            Tile& tile) const {
+    if (!first.is_hit || !camera_inside_.is_empty() || may_let_pass_[first.hit.placement]) return;
+    const Surface surface = resolver_.glimpse(first.hit, first.ray.direction);
     first.position = surface.position;
     first.normal = surface.normal;
     first.footprint = pixel_.radius + pixel_.spread * first.hit.t;
-    note(first.hit, surface, (surface.position - camera_ray.origin).dot(view_axis), sampler, pixel, tile);
+    note(first.hit, surface, (surface.position - first.ray.origin).dot(view_axis), sampler, pixel, tile);
     first.is_noted = true;
-    return first;
 }
 
 // What a sample shows first, as far as shading has no part in it.

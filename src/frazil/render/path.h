@@ -38,9 +38,11 @@ class PathTracer {
                const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
                const MotionVectors* motion = nullptr);
 
-    // What a sample sees first; noted in the tile where that is certain before it is shaded.
-    FirstHit see(const Ray& camera_ray, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
-                 Tile& tile) const;
+    // What a sample sees first.
+    FirstHit see(const Ray& camera_ray, Tile& tile) const;
+    // Note it in the tile where that is certain before it is shaded: then it may stand for others, and they for it.
+    void note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
+                    Tile& tile) const;
     // Shade one sample, for as many as it stands for. `sampler` stands after the camera's own dimensions.
     void trace(const FirstHit& first, float samples, const V3f& view_axis, Sampler sampler, std::uint32_t pixel,
                Tile& tile) const;

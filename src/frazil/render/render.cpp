@@ -226,8 +226,8 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
                 const float image_x = (x + 0.5f + filter.offset(u.x)) / options.width;
                 const float image_y = (y + 0.5f + filter.offset(u.y)) / options.height;
                 ++tile.camera_rays;
-                hits.push_back(tracer.see(camera_ray(scene.camera, image_x, image_y, aspect), view_axis, sampler,
-                                          tile_pixel, tile));
+                hits.push_back(tracer.see(camera_ray(scene.camera, image_x, image_y, aspect), tile));
+                if (plan.is_decoupled) tracer.note_first(hits.back(), view_axis, sampler, tile_pixel, tile);
             }
             if (!plan.is_decoupled) {
                 for (int k = 0; k < last - first; ++k) {
