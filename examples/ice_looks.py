@@ -95,23 +95,23 @@ def frame(at, to) -> np.ndarray:
     return matrix
 
 
-def set_scene(eye, to, focal_length: float = 50.0) -> fz.Scene:
-    """Snow, sky and sun."""
+def set_scene(eye, to, focal_length: float = 50.0, ground=None, sun=kSun, skylight=kSkyLight, sunlight=kSunlight):
+    """Ground (snow by default), sky and sun."""
     scene = fz.Scene()
-    ground = fz.Mesh(
+    plane = fz.Mesh(
         np.array([[-40, 0, 40], [40, 0, 40], [40, 0, -40], [-40, 0, -40]], np.float32),
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
     )
-    snow = fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
-    scene.add_object("/snow", scene.add_mesh(ground, "/snow"), scene.add_material("/snow", snow))
-    sky = make_sky(2048, kSun, 5)
-    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (kSkyLight,), path="/sky", group="sky"))
+    ground = ground or fz.StandardMaterial(diffuse_color=(0.82, 0.86, 0.91), roughness=0.7, ior=1.31)
+    scene.add_object("/ground", scene.add_mesh(plane, "/ground"), scene.add_material("/ground", ground))
+    sky = make_sky(2048, sun, 5)
+    scene.add_light(fz.Light(fz.DomeLight(sky), radiance=3 * (skylight,), path="/sky", group="sky"))
     scene.add_light(
         fz.Light(
             fz.DistantLight(2.5),
-            radiance=kSunlight,
+            radiance=sunlight,
             normalize=True,
-            matrix=frame(kSun, (0, 0, 0)),
+            matrix=frame(sun, (0, 0, 0)),
             path="/sun",
             group="sun",
         )
@@ -170,26 +170,43 @@ def depths(size: int, samples: int) -> np.ndarray:
 
 
 def breath(size: int, samples: int) -> np.ndarray:
-    """Fresh breath ice before dark rock, lit from behind: without the light that it scatters once, with it, and with it
-    in clouds of bubbles."""
-    clouds = fz.Density(contrast=1.6, size=0.22, octaves=4, absorption=0.0, seed=2)
-    wall = np.array([[-9, -1, -3], [9, -1, -3], [9, 6, -3], [-9, 6, -3]], np.float32)
-    rock = fz.StandardMaterial(diffuse_color=(0.02, 0.022, 0.026), roughness=0.6, ior=1.5)
+    """Milky breath ice: without and with the light that it scatters once, and that in clouds of bubbles.
+
+    What is scattered once shows against the dark, with the light behind it: under a white sky it replaces as much as it
+    adds.
+    """
+    clouds = fz.Density(contrast=1.3, size=0.35, octaves=4, absorption=0.0, seed=2)
+    rock = fz.StandardMaterial(diffuse_color=(0.05, 0.055, 0.065), roughness=1.0, ior=1.0)
+    sun = np.array([-0.35, 0.5, -0.8])
     pictures = []
     for volume, density in ((0.0, fz.Density()), (1.0, fz.Density()), (1.0, clouds)):
-        scene = set_scene((1.4, 0.85, 2.6), (0.0, 0.48, 0.0), 74.0)
-        mesh = scene.add_mesh(fz.Mesh(wall, np.array([[0, 1, 2], [0, 2, 3]], np.int32)), "/wall")
-        scene.add_object("/wall", mesh, scene.add_material("/rock", rock))
-        lamp = fz.RectLight(0.5, 0.5)
-        scene.add_light(
-            fz.Light(
-                lamp, matrix=frame((-1.6, 1.5, -1.6), (0, 0.5, 0)), radiance=(60, 54, 46), path="/rim", group="rim"
-            )
+        scene = set_scene((1.0, 0.5, 3.0), (0.0, 0.6, 0.0), 90.0, rock, sun, 0.08, (9.0, 9.4, 10.0))
+        ice = fz.ice_preset(
+            "fresh_breath", age=0.15, depth=6.0, spacing=0.03, volume=volume, density=density, anisotropy=0.6
         )
-        ice = fz.ice_preset("fresh_breath", age=0.1, depth=2.0, spacing=0.03, volume=volume, density=density)
-        add_shard(scene, ice)
+        ice.medium = fz.Medium((4.0, 4.0, 4.0), ice.medium.sigma_a)  # breath: milky within a hand's breadth or two
+        add_burst(scene, ice)
         pictures.append(picture(scene, size, size, samples))
     return np.concatenate(pictures, 1)
+
+
+def add_burst(scene: fz.Scene, ice: fz.IceMaterial) -> None:
+    """Nine blades that stand out from where a breath struck, as one body of ice."""
+    shard = Shard((0.8, 1.5, 0.6), 4)
+    mesh = to_mesh(contour(shard, *shard.bounds(), 0.025).largest_piece())
+    material, geometry = scene.add_material("/ice", ice), scene.add_mesh(mesh, "/ice")
+    rng = np.random.default_rng(3)
+    for number in range(9):
+        turn = 2 * np.pi * number / 9 + rng.uniform(-0.3, 0.3)
+        lean = rng.uniform(0.25, 0.95) if number else 0.1
+        size = rng.uniform(0.45, 0.8) if number else 1.0
+        c, s = np.cos(turn), np.sin(turn)
+        upright = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+        tilted = np.array([[np.cos(lean), np.sin(lean), 0], [-np.sin(lean), np.cos(lean), 0], [0, 0, 1]])
+        matrix = np.eye(4)
+        matrix[:3, :3] = size * np.diag([0.6, 1.0, 0.6]) @ tilted @ upright
+        matrix[3, :3] = 0.62 * matrix[1, :3] - [0.0, 0.05, 0.0]
+        scene.add_object(f"/ice{number}", geometry, material, matrix, translucency_set="ice")
 
 
 def shells(size: int, samples: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "frazil/base/error.h"
+#include "frazil/base/sampler.h"
 #include "frazil/base/random.h"
 #include "frazil/material/overlay.h"
 #include "scenes.h"
@@ -276,6 +277,35 @@ TEST_CASE("cells keep their mean cover under any footprint") {
             CAPTURE(footprint);
             // Walls beside the nearest one go missing while cells are still told apart.
             CHECK(mean_mask(pattern, 300, footprint) == doctest::Approx(fine).epsilon(0.15));
+        }
+    }
+}
+
+TEST_CASE("snow and frost keep their mean cover under any footprint, on walls of any slope") {
+    for (const PatternKind kind : {PatternKind::snow, PatternKind::frost}) {
+        Pattern pattern = pattern_of(kind);
+        for (const float amount : {0.3f, 0.5f, 0.7f}) {
+            pattern.amount = amount;
+            for (const float up : {-0.2f, 0.2f, 0.4f, 0.6f, 0.9f}) {
+                const auto mean = [&](float footprint) {
+                    double sum = 0.0;
+                    for (std::uint32_t i = 0; i < 4000; ++i) {
+                        Sampler sampler(3, i, 0);
+                        const V2f xy = sampler.next_2d();
+                        const V3f place(8.0f * xy.x, 8.0f * xy.y, 8.0f * sampler.next_1d());
+                        sum += eval_pattern(pattern, {place, V3f(std::sqrt(1.0f - up * up), up, 0.0f), footprint});
+                    }
+                    return sum / 4000.0;
+                };
+                const double fine = mean(0.0f);
+                for (const float footprint : {0.02f, 0.05f, 0.1f, 0.5f, 3.0f}) {
+                    CAPTURE(int(kind));
+                    CAPTURE(amount);
+                    CAPTURE(up);
+                    CAPTURE(footprint);
+                    CHECK(std::abs(mean(footprint) - fine) < 0.04);
+                }
+            }
         }
     }
 }

@@ -103,12 +103,12 @@ def breath_burst(
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 1.0, budget, -0.10)]
-    image, lights = sky_and_lights(seed, (-0.75, 0.45, -0.55), sun_light=5.5)
+    image, lights = sky_and_lights(seed, (-0.75, 0.45, -0.55), sun_light=3.4)
     return Formation(
         "breath_burst",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count, spread=spread),
         parts,
-        {"Ice": ice("fresh_breath", age, 0.35), "Snow": kSnow},
+        {"Ice": ice("fresh_breath", age, 0.35, depth=2.4), "Snow": kSnow},
         lights,
         CameraRow((1.3, 0.8, 4.4), (0.2, 0.78, 0.2), 38.0),
         image,

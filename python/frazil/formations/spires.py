@@ -91,12 +91,12 @@ def spire_cluster(
         return 0.22 * np.exp(-np.maximum(away - 0.75, 0.0) / 0.25) * (0.8 + 0.4 * swirl(p, 0.8)[:, 0])
 
     parts.append(snowfield(seed, 2.0, budget, -0.12, lift=drift))
-    image, lights = sky_and_lights(seed, _SUN)
+    image, lights = sky_and_lights(seed, _SUN, sun_light=3.4)
     return Formation(
         "spire_cluster",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count, lean=lean),
         parts,
-        {"Ice": ice("arctic_blue", age, 1.0), "Rock": kRock, "Snow": kSnow},
+        {"Ice": ice("arctic_blue", age, 1.0, depth=7.0), "Rock": kRock, "Snow": kSnow},
         lights,
         CameraRow((1.1, 0.85, 7.4), (0.0, 1.82, 0.0), 36.0),
         image,
@@ -178,12 +178,12 @@ def ice_tips(
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 0.5, budget, -0.10)]
-    image, lights = sky_and_lights(seed, (0.55, 0.35, -0.75), sun_light=6.0)
+    image, lights = sky_and_lights(seed, (0.55, 0.35, -0.75), sun_light=3.4)
     return Formation(
         "ice_tips",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count),
         parts,
-        {"Ice": ice("arctic_blue", age, 0.5), "Snow": kSnow},
+        {"Ice": ice("arctic_blue", age, 0.5, depth=4.0), "Snow": kSnow},
         lights,
         CameraRow((0.15, 0.42, 2.1), (0.0, 0.42, 0.0), 35.0),
         image,

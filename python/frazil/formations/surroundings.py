@@ -20,9 +20,13 @@ kRock = MaterialRow("UsdPreviewSurface", {"roughness": 0.45, "ior": 1.5}, uses_c
 kWater = MaterialRow("UsdPreviewSurface", {"roughness": 0.08, "ior": 1.33}, uses_colors=True)
 
 
-def ice(preset: str, age: float, size: float, **inputs) -> MaterialRow:
-    """frazil:ice of a preset, for a body of `size` metres: its real absorption up to a depth of kDeepest metres."""
-    row = {"preset": preset, "preset_scale": float(size), "preset_depth": min(float(size), kDeepest), "age": float(age)}
+def ice(preset: str, age: float, size: float, depth: float | None = None, **inputs) -> MaterialRow:
+    """frazil:ice of a preset, for a body of `size` metres that is as blue as one of `depth` metres.
+
+    By default its absorption is that of real ice, up to a depth of kDeepest metres.
+    """
+    depth = min(float(size), kDeepest) if depth is None else float(depth)
+    row = {"preset": preset, "preset_scale": float(size), "preset_depth": depth, "age": float(age)}
     return MaterialRow("frazil:ice", row | inputs)
 
 

@@ -11,7 +11,6 @@ namespace {
 constexpr float kFarAway = 1e18f;  // metres; finite, so that 0 times it is 0
 constexpr float kStepsPerFeature = 4.0f;
 constexpr int kMostSteps = 1024;
-constexpr float kLacunarity = 2.03f;  // of fractal_noise
 
 constexpr std::size_t kPlaces = 65536;  // of a body that tell its mean
 constexpr float kThinnest = 1e-3f;      // mean density that diffusion still knows

@@ -30,6 +30,13 @@ Value interpolate(const V3f& place, std::uint32_t seed, const Corner& corner) {
                mix(mix(at(0, 0, 1), at(1, 0, 1), u), mix(at(0, 1, 1), at(1, 1, 1), u), v), w);
 }
 
+constexpr float kGradientVariance = 0.0729f;  // of gradient_noise over space
+
+// How much of an octave is seen: a footprint wider than half a cell sees its mean, which is 0.
+float octave_seen(float footprint, float frequency) {
+    return std::clamp(2.0f - 4.0f * footprint * frequency, 0.0f, 1.0f);
+}
+
 }  // namespace
 
 V3f cell_point(int x, int y, int z, std::uint32_t seed) {
@@ -50,14 +57,23 @@ V3f vector_noise(const V3f& place, std::uint32_t seed) {
     });
 }
 
+float fractal_variance_left_out(int octaves, float footprint) {
+    float sum = 0.0f, strength = 1.0f, frequency = 1.0f;
+    for (int octave = 0; octave < octaves; ++octave) {
+        const float seen = octave_seen(footprint, frequency);
+        sum += (1.0f - seen * seen) * strength * strength;
+        strength *= 0.5f, frequency *= kLacunarity;
+    }
+    return sum * kGradientVariance;
+}
+
 float fractal_noise(const V3f& place, int octaves, float footprint, std::uint32_t seed) {
     float sum = 0.0f, strength = 1.0f, frequency = 1.0f;
     for (int octave = 0; octave < octaves; ++octave) {
-        // A footprint wider than half a cell sees the octave's mean, which is 0.
-        const float seen = std::clamp(2.0f - 4.0f * footprint * frequency, 0.0f, 1.0f);
+        const float seen = octave_seen(footprint, frequency);
         if (seen == 0.0f) break;
         sum += seen * strength * gradient_noise(place * frequency, seed + std::uint32_t(octave));
-        strength *= 0.5f, frequency *= 2.03f;
+        strength *= 0.5f, frequency *= kLacunarity;
     }
     return sum;
 }

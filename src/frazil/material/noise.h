@@ -15,11 +15,15 @@ namespace frazil {
 // Smooth, about -0.8..0.8, mean 0.
 float gradient_noise(const V3f& place, std::uint32_t seed);
 
+inline constexpr float kLacunarity = 2.03f;
+
 // Three independent ones at once.
 V3f vector_noise(const V3f& place, std::uint32_t seed);
 
-// Octaves of it, each half as strong and twice as fine; those finer than the footprint (radius) fade out.
+// Octaves of it, each half as strong and kLacunarity times as fine; those finer than the footprint (radius) fade out.
 float fractal_noise(const V3f& place, int octaves, float footprint, std::uint32_t seed);
+// The variance of what the footprint leaves out of it.
+float fractal_variance_left_out(int octaves, float footprint);
 
 // Where the place lies in the cells about one random point per lattice cell.
 struct CellWall {

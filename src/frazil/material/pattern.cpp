@@ -137,6 +137,15 @@ float cells_mask(const Pattern& pattern, const PatternPoint& at) {
     return 1.0f - left;
 }
 
+constexpr float kFolded = 0.63661977f;  // the square of a normal variable's mean magnitude: 2 / pi
+
+// A smooth step about a level that is uncertain by a variance: the mean of the steps. A step's slope over +-width has the
+// variance width² / 5.
+float soft_step(float level, float width, float variance, float value) {
+    width = std::sqrt(width * width + 5.0f * variance);
+    return smooth_step(level - width, level + width, value);
+}
+
 float frost_mask(const Pattern& pattern, const PatternPoint& at) {
     const V3f place = at.position / pattern.size;
     const float footprint = at.footprint / pattern.size;
@@ -147,11 +156,14 @@ float frost_mask(const Pattern& pattern, const PatternPoint& at) {
     }
     const float growth = fractal_noise(bent, octaves + 2, footprint, pattern.seed);
     // Crystals: fine ridges within the growth.
-    const float ridge =
-        1.0f - 2.0f * std::abs(fractal_noise(bent * 6.0f, octaves, footprint * 6.0f, pattern.seed + 50U));
+    const float fine = fractal_noise(bent * 6.0f, octaves, 6.0f * footprint, pattern.seed + 50U);
+    // What the footprint leaves out of the growth softens the edge; of the crystals it also leaves the mean of their folds.
+    const float growth_variance = fractal_variance_left_out(octaves + 2, footprint);
+    const float fine_variance = fractal_variance_left_out(octaves, 6.0f * footprint);
+    const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
     const float level = 0.5f + 0.55f * growth + 0.18f * ridge + 0.5f * pattern.slope * facing(pattern, at);
-    const float threshold = 1.15f - 1.1f * pattern.amount, soft = 0.16f + std::min(footprint, 0.5f);
-    return smooth_step(threshold - soft, threshold + soft, level);
+    const float threshold = 1.15f - 1.1f * pattern.amount, left_out = 0.55f * 0.55f * growth_variance + 0.36f * 0.36f * (1.0f - kFolded) * fine_variance;
+    return soft_step(threshold, 0.16f, left_out, level);
 }
 
 float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
@@ -178,9 +190,11 @@ float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
 
 float snow_mask(const Pattern& pattern, const PatternPoint& at) {
     const V3f place = at.position / pattern.size;
-    const float n = fractal_noise(place, 2 + std::max(0, pattern.scales), at.footprint / pattern.size, pattern.seed);
-    const float steep = 1.0f - pattern.amount;
-    return smooth_step(steep - 0.12f, steep + 0.12f, facing(pattern, at) + 0.35f * n);
+    const int octaves = 2 + std::max(0, pattern.scales);
+    const float footprint = at.footprint / pattern.size;
+    const float n = fractal_noise(place, octaves, footprint, pattern.seed);
+    return soft_step(1.0f - pattern.amount, 0.12f, 0.35f * 0.35f * fractal_variance_left_out(octaves, footprint),
+                     facing(pattern, at) + 0.35f * n);
 }
 
 float bands_mask(const Pattern& pattern, const PatternPoint& at) {
