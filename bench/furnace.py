@@ -61,7 +61,9 @@ def main() -> None:
     print("| compensation | least | mean | greatest | within 2 % |\n|---|---|---|---|---|")
     for mode in options.modes:
         bounces = options.bounces if mode in ("conserve", "depth") else 0  # others make energy with each
-        values = furnace(mesh, mode, bounces, options.samples, options.spacing, options.eta, options.size, options.bake_samples)
+        values = furnace(
+            mesh, mode, bounces, options.samples, options.spacing, options.eta, options.size, options.bake_samples
+        )
         close = 100 * np.mean(np.abs(values - 1) <= 0.02)
         numbers = " | ".join(f"{v:.3f}" for v in (values.min(), values.mean(), values.max()))
         print(f"| {mode}, {bounces} bounces | {numbers} | {close:.1f} % |", flush=True)

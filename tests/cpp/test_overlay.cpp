@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "frazil/base/error.h"
-#include "frazil/base/sampler.h"
 #include "frazil/base/random.h"
+#include "frazil/base/sampler.h"
 #include "frazil/material/overlay.h"
 #include "scenes.h"
 

@@ -162,7 +162,8 @@ float frost_mask(const Pattern& pattern, const PatternPoint& at) {
     const float fine_variance = fractal_variance_left_out(octaves, 6.0f * footprint);
     const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
     const float level = 0.5f + 0.55f * growth + 0.18f * ridge + 0.5f * pattern.slope * facing(pattern, at);
-    const float threshold = 1.15f - 1.1f * pattern.amount, left_out = 0.55f * 0.55f * growth_variance + 0.36f * 0.36f * (1.0f - kFolded) * fine_variance;
+    const float threshold = 1.15f - 1.1f * pattern.amount,
+                left_out = 0.55f * 0.55f * growth_variance + 0.36f * 0.36f * (1.0f - kFolded) * fine_variance;
     return soft_step(threshold, 0.16f, left_out, level);
 }
 
