@@ -1,6 +1,6 @@
 """White furnace: ice that absorbs nothing under even light of radiance 1 must look 1 everywhere.
 
-    python bench/furnace.py MESH.ply [--bounces 8] [--samples 64] [--bake-samples 256] [--size 96] [--spacing S] [--eta 1.31]
+    python bench/furnace.py MESH.ply [--bounces 8] [--samples 64] [--bake-samples 256] [--size 96] [--modes M ...]
 
 Per compensation: least, mean and greatest radiance over the pixels that the body fills, and the share within 2 % of 1.
 """
