@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from . import image
+from . import exr, image
 from .aovs import aov_table
 from .warning import FrazilWarning
 
@@ -137,7 +137,7 @@ class Film:
         for name in (*half_layers, *float_layers):
             self[name]  # refuse unknown names
         halves = (halves | set(half_layers)) - set(float_layers)
-        promoted = image.write_exr(
+        promoted = exr.write_exr(
             path,
             chosen,
             {name: _letters(name, array, table) for name, array in chosen.items()},
@@ -174,7 +174,7 @@ class Film:
         OSError
             For a file that is missing, truncated or no image.
         """
-        layers, metadata = image.read_exr(path, keep_half=keep_half)
+        layers, metadata = exr.read_exr(path, keep_half=keep_half)
         return cls(layers, metadata)
 
 

@@ -1,15 +1,12 @@
-"""Pictures on disk: layered OpenEXR and PNG previews, replaced whole or not at all.
+"""Previews through a display transform, and images of any format as linear light.
 
-Model: a layer is an (H, W, C) float32 array; its channels are stored as ``layer.R``, those of the beauty as plain
-R, G, B, A, and a layer of one channel under its own name. Files are replaced whole (see replacing.py).
-Units: linear light in the EXR; the preview goes through a display transform. Row 0 is on top.
-Not: tiles, mip-maps, deep data; other formats than EXR and PNG.
+Model: (H, W, 3) float32 linear Rec.709. Row 0 is on top. Files are replaced whole (see replacing.py).
+Not: layers (see exr.py), tiles, mip-maps.
 """
 
 import contextlib
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,363 +14,9 @@ import numpy as np
 
 from .replacing import replacing
 
-__all__ = [
-    "COMPRESSIONS",
-    "channel_names",
-    "display_rgb",
-    "read_exr",
-    "read_header",
-    "read_picture",
-    "write_exr",
-    "write_png",
-]
+__all__ = ["display_rgb", "read_picture", "read_picture_steps", "write_png"]
 
-# Attributes that writing sets itself, whatever the picture that was read had.
-_OWN_ATTRIBUTES = ("compression", "name", "chunkCount", "dataWindow", "displayWindow")
-LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
-COMPRESSIONS = ("none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 HALF_MAX = 65504.0  # the largest finite half
-STRIP = 256  # rows written at a time: a multiple of every compression's block
-
-
-# ---- layered EXR -----------------------------------------------------------------------------------------------------
-
-
-def channel_names(layer: str, letters: str) -> list[str]:
-    """What the channels of a layer are called in an EXR: ``specular.R``, R for the beauty, ``Z`` where there is one."""
-    if layer == "beauty":
-        return list(letters)
-    if len(letters) == 1:
-        return [layer]
-    return [f"{layer}.{letter}" for letter in letters]
-
-
-@dataclass
-class _Part:
-    """What one part of the file holds: channels by name, (H, W) each, and their formats."""
-
-    name: str
-    channels: list[str]
-    arrays: list[np.ndarray]
-    formats: list[str]
-    compression: str
-
-
-def write_exr(
-    path: str | os.PathLike,
-    layers: Mapping[str, np.ndarray],
-    letters: Mapping[str, str],
-    *,
-    half_layers: Sequence[str] = (),
-    exact_layers: Sequence[str] = (),
-    compression: str = "zips",
-    multipart: bool = False,
-    metadata: Mapping[str, Any] | None = None,
-) -> list[str]:
-    """Write layers as one multi-channel EXR, atomically.
-
-    Parameters
-    ----------
-    path : path-like
-        The file; its folder must exist.
-    layers : mapping of str to (H, W, C) float32 or float16
-        All of one size. Non-contiguous views are fine.
-    letters : mapping of str to str
-        One letter per channel of each layer, as in ``"RGB"``.
-    half_layers : sequence of str
-        Layers stored as half; the others are float. A layer with a finite value beyond what half holds (65504) stays
-        float, so that nothing is clamped.
-    exact_layers : sequence of str
-        Layers whose bits matter (Cryptomatte): never stored by a lossy compression.
-    compression : str
-        One of `COMPRESSIONS`. b44, b44a, dwaa and dwab lose precision, pxr24 that of float layers.
-    multipart : bool
-        Every layer in a part of its own, named after it, so that a program reads only what it shows.
-    metadata : mapping, optional
-        str, int, float or sequences of float, stored as header attributes. ``dataWindow`` and ``displayWindow``, (x, y,
-        width, height) in pixels, place the picture; the size of the data window is that of the layers.
-
-    Returns
-    -------
-    list of str
-        The half layers that had to stay float.
-
-    Raises
-    ------
-    ValueError
-        For no layers, sizes that disagree, an unknown compression, or a lossy one for an exact layer in a single part.
-    OSError
-        Where the file cannot be written; what was there before is untouched.
-    """
-    import OpenImageIO as oiio
-
-    if compression not in COMPRESSIONS:
-        raise ValueError(f"{path}: compression must be one of {', '.join(COMPRESSIONS)}, got {compression!r}.")
-    if not layers:
-        raise ValueError(f"{path}: layers must be one or more, got none.")
-    height, width = next(iter(layers.values())).shape[:2]
-    for name, array in layers.items():
-        if array.shape != (height, width, len(letters[name])):
-            raise ValueError(
-                f"{path}: layer {name} must have shape {(height, width, len(letters[name]))}, got {array.shape}."
-            )
-    exact = [name for name in exact_layers if name in layers]
-    if exact and compression in LOSSY and not multipart:
-        raise ValueError(
-            f"{path}: compression must keep the bits of layer {exact[0]}, got {compression}. Choose zips or piz, or "
-            "--multipart, where every layer has its own."
-        )
-    promoted = [name for name in half_layers if name in layers and _exceeds_half(layers[name])]
-    parts = [
-        _Part(
-            name,
-            names := channel_names(name, letters[name]),
-            [layers[name][:, :, i] for i in range(len(names))],
-            ["half" if name in half_layers and name not in promoted else "float"] * len(names),
-            "zips" if name in exact and compression in LOSSY else compression,
-        )
-        for name in layers
-    ]
-    if not multipart:
-        joined = _Part("", [], [], [], compression)
-        for part in parts:
-            joined.channels += part.channels
-            joined.arrays += part.arrays
-            joined.formats += part.formats
-        parts = [joined]
-    specs = [_spec_of(oiio, part, metadata or {}, is_first=i == 0) for i, part in enumerate(parts)]
-
-    with replacing(path) as temporary:
-        output = oiio.ImageOutput.create("openexr")
-        try:
-            opened = output.open(str(temporary), tuple(specs)) if multipart else output.open(str(temporary), specs[0])
-            _check(opened, output)
-            for i, (part, spec) in enumerate(zip(parts, specs, strict=True)):
-                if i > 0:
-                    _check(output.open(str(temporary), spec, "AppendSubimage"), output)
-                for top in range(0, height, STRIP):
-                    bottom = min(height, top + STRIP)
-                    # Half arrays for half channels are stored as they are.
-                    is_half = set(part.formats) == {"half"} and all(a.dtype == np.float16 for a in part.arrays)
-                    kind = np.float16 if is_half else np.float32
-                    strip = np.stack([array[top:bottom] for array in part.arrays], axis=-1, dtype=kind)
-                    _check(output.write_scanlines(spec.y + top, spec.y + bottom, 0, strip), output)
-        finally:
-            closed = output.close()
-        _check(closed, output)
-    return promoted
-
-
-def _spec_of(oiio: Any, part: _Part, metadata: Mapping[str, Any], is_first: bool) -> Any:
-    height, width = part.arrays[0].shape
-    spec = oiio.ImageSpec(width, height, len(part.channels), part.formats[0])
-    spec.channelnames = tuple(part.channels)
-    if len(set(part.formats)) > 1:  # OpenImageIO takes no heed of channelformats that are all the same
-        spec.channelformats = tuple(part.formats)
-    spec.attribute("compression", part.compression)
-    if part.name:
-        spec.attribute("oiio:subimagename", part.name)
-    if "dataWindow" in metadata:
-        spec.x, spec.y = (int(v) for v in metadata["dataWindow"][:2])
-    if "displayWindow" in metadata:
-        spec.full_x, spec.full_y, spec.full_width, spec.full_height = (int(v) for v in metadata["displayWindow"])
-    for key, value in metadata.items():
-        # A later part repeats only what belongs to it.
-        is_wanted = is_first or (key.startswith("cryptomatte/") and part.name.startswith("crypto"))
-        if is_wanted and key not in _OWN_ATTRIBUTES and not key.startswith(("oiio:", "openexr:")):
-            _set_attribute(oiio, spec, key, value)
-    return spec
-
-
-def read_exr(
-    path: str | os.PathLike, *, keep_half: bool = False, layers: Collection[str] | None = None
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Read a multi-channel EXR, of one part or several, back into layers.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    keep_half : bool
-        Give float16 for layers that are stored as half: half the memory. Else all are float32.
-    layers : collection of str, optional
-        Only these; those that the file lacks are left out. All of them if not given.
-
-    Returns
-    -------
-    layers : dict of str to (H, W, C) float32 or float16
-        R, G, B, A are ``beauty``; a part whose channels have no layer of their own in their names is the layer of the
-        part's name. The order is that of the file. Each array has its own memory.
-    metadata : dict
-        The header's attributes. ``dataWindow`` and ``displayWindow`` where the two differ.
-
-    Raises
-    ------
-    OSError
-        Naming `path`, for a file that is missing, truncated or no image.
-    ValueError
-        For parts of several sizes, or a layer that is in several parts.
-    """
-    result: dict[str, np.ndarray] = {}
-    metadata: dict[str, Any] = {}
-    with _opened(path) as source:
-        for spec in _parts(source):
-            columns = _layers_of(spec, part_names=_part_names(source))
-            columns = {name: own for name, own in columns.items() if layers is None or name in layers}
-            for name in columns:
-                if name in result:
-                    raise ValueError(f"{path}: layer {name} must be in one part, is in several.")
-            result |= _read_part(path, source, spec, columns, keep_half)
-            metadata = _attributes(spec) | metadata
-    sizes = sorted({array.shape[:2] for array in result.values()})
-    if len(sizes) > 1:
-        raise ValueError(f"{path}: parts must have one size, got {sizes}. Crop them to the same data window.")
-    return result, metadata
-
-
-def _parts(source: Any) -> Iterator[Any]:
-    """The spec of each part; the source stands there meanwhile."""
-    index = 0
-    while source.seek_subimage(index, 0):
-        yield source.spec()
-        index += 1
-    source.geterror()  # of the seek beyond the last
-
-
-def _part_names(source: Any) -> list[str]:
-    index, names = source.current_subimage(), []
-    at = 0
-    while source.seek_subimage(at, 0):
-        names.append(source.spec().get_string_attribute("oiio:subimagename"))
-        at += 1
-    source.geterror()
-    source.seek_subimage(index, 0)
-    return names
-
-
-def _layers_of(spec: Any, part_names: Sequence[str]) -> dict[str, list[int]]:
-    """The columns of each layer of a part."""
-    part = spec.get_string_attribute("oiio:subimagename")
-    columns: dict[str, list[int]] = {}
-    for i, channel in enumerate(spec.channelnames):
-        name = _layer_of(channel)
-        if len(part_names) > 1 and "." not in channel and part != part_names[0]:
-            name = part or name  # bare R, G, B in a part that says whose they are
-        columns.setdefault(name, []).append(i)
-    return columns
-
-
-def _read_part(
-    path: str | os.PathLike, source: Any, spec: Any, columns: Mapping[str, list[int]], keep_half: bool
-) -> dict[str, np.ndarray]:
-    formats = [str(f) for f in spec.channelformats or (spec.format,) * spec.nchannels]
-    arrays: dict[str, np.ndarray] = {}
-    for name, own in columns.items():
-        is_half = keep_half and all(formats[i] == "half" for i in own)
-        arrays[name] = np.empty((spec.height, spec.width, len(own)), np.float16 if is_half else np.float32)
-    if not arrays:
-        return arrays
-    # All channels of a strip at a time: they are compressed together.
-    kind = (
-        "half" if all(array.dtype == np.float16 for array in arrays.values()) and set(formats) == {"half"} else "float"
-    )
-    rows = max(16, STRIP * 16 // max(spec.nchannels, 16) // 16 * 16)
-    for top in range(0, spec.height, rows):
-        bottom = min(spec.height, top + rows)
-        strip = source.read_scanlines(spec.y + top, spec.y + bottom, 0, 0, spec.nchannels, kind)
-        if strip is None or source.has_error:
-            raise OSError(f"{path}: must be a whole image: {_one_line(source.geterror())}")
-        for name, own in columns.items():
-            for i, column in enumerate(own):
-                arrays[name][top:bottom, :, i] = strip.reshape(bottom - top, spec.width, -1)[:, :, column]
-    return arrays
-
-
-def read_header(path: str | os.PathLike) -> tuple[int, int, dict[str, dict[str, str]], dict[str, Any]]:
-    """What an EXR says of itself, without its pixels.
-
-    Returns
-    -------
-    width, height : int
-    layers : dict of str to dict
-        By layer: channel name to its format, half, float or uint.
-    metadata : dict
-
-    Raises
-    ------
-    OSError
-        As `read_exr`.
-    """
-    layers: dict[str, dict[str, str]] = {}
-    metadata: dict[str, Any] = {}
-    with _opened(path) as source:
-        first = source.spec()
-        for spec in _parts(source):
-            formats = spec.channelformats or (spec.format,) * spec.nchannels
-            for name, columns in _layers_of(spec, _part_names(source)).items():
-                layers[name] = {spec.channelnames[i]: str(formats[i]) for i in columns}
-            metadata = _attributes(spec) | metadata
-    return first.width, first.height, layers, metadata
-
-
-@contextlib.contextmanager
-def _opened(path: str | os.PathLike) -> Iterator[Any]:
-    import OpenImageIO as oiio
-
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"{path}: file must exist. Check the path.")
-    source = oiio.ImageInput.open(str(path))
-    if source is None:
-        raise OSError(f"{path}: must be an image: {_one_line(oiio.geterror())}")
-    try:
-        yield source
-    finally:
-        source.close()
-
-
-def _layer_of(channel: str) -> str:
-    layer, _, letter = channel.rpartition(".")
-    if layer in ("matte", "refracted_matte"):
-        return channel  # one channel per matte: each is a layer
-    if layer:
-        return layer
-    return "beauty" if letter in ("R", "G", "B", "A") else letter
-
-
-def _attributes(spec: Any) -> dict[str, Any]:
-    attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
-    data = (spec.x, spec.y, spec.width, spec.height)
-    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
-    return attributes if data == display else attributes | {"dataWindow": data, "displayWindow": display}
-
-
-def _exceeds_half(array: np.ndarray) -> bool:
-    magnitude = np.abs(array)
-    return bool(np.any((magnitude > HALF_MAX) & np.isfinite(magnitude)))
-
-
-def _set_attribute(oiio: Any, spec: Any, key: str, value: Any) -> None:
-    if isinstance(value, bool):
-        value = int(value)
-    if isinstance(value, int) and not -(2**31) <= value < 2**31:
-        value = str(value)  # OpenEXR's integers have 32 bits with sign
-    if isinstance(value, str | int | float):
-        spec.attribute(key, value)
-        return
-    values = np.asarray(value, dtype=np.float32).ravel()
-    if values.size == 16:
-        spec.attribute(key, oiio.TypeMatrix44, tuple(values.tolist()))
-    else:
-        spec.attribute(key, oiio.TypeDesc(f"float[{values.size}]"), tuple(values.tolist()))
-
-
-def _check(succeeded: bool, output: Any) -> None:
-    if not succeeded:
-        raise OSError(_one_line(output.geterror()) or "writing failed")
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 # ---- preview ---------------------------------------------------------------------------------------------------------
@@ -411,7 +54,7 @@ def _ocio_display(linear: np.ndarray) -> tuple[np.ndarray, str]:
     import OpenImageIO as oiio
 
     config = oiio.ColorConfig(os.environ["OCIO"])
-    if problem := _one_line(config.geterror()):
+    if problem := one_line(config.geterror()):
         raise OSError(f"OCIO: must name a configuration, got '{os.environ['OCIO']}': {problem}.")
     # Our light has Rec.709 primaries; a configuration without such a space takes it as its scene_linear.
     spaces = config.getColorSpaceNames()
@@ -422,7 +65,7 @@ def _ocio_display(linear: np.ndarray) -> tuple[np.ndarray, str]:
     source = oiio.ImageBuf(np.ascontiguousarray(linear))
     shown = oiio.ImageBufAlgo.ociodisplay(source, display, view, space, colorconfig=os.environ["OCIO"])
     if shown.has_error:
-        raise OSError(f"OCIO: display '{display}', view '{view}' failed: {_one_line(shown.geterror())}")
+        raise OSError(f"OCIO: display '{display}', view '{view}' failed: {one_line(shown.geterror())}")
     return np.clip(shown.get_pixels(oiio.FLOAT), 0.0, 1.0), f"{display} / {view}"
 
 
@@ -442,11 +85,11 @@ def write_png(path: str | os.PathLike, linear: np.ndarray) -> str:
     with replacing(path) as temporary:
         output = oiio.ImageOutput.create("png")
         try:
-            _check(output.open(str(temporary), spec), output)
-            _check(output.write_image(np.ascontiguousarray(display)), output)
+            check_written(output.open(str(temporary), spec), output)
+            check_written(output.write_image(np.ascontiguousarray(display)), output)
         finally:
             closed = output.close()
-        _check(closed, output)
+        check_written(closed, output)
     return transform
 
 
@@ -495,11 +138,11 @@ def read_picture_steps(path: str | os.PathLike) -> np.ndarray | None:
 
 def _read_colors(path: str | os.PathLike) -> tuple[np.ndarray, int]:
     """(H, W, 3) float32 as they are in the file, and the number of the highest level; 0 for floats."""
-    with _opened(path) as source:
+    with opened(path) as source:
         spec = source.spec()
         pixels = source.read_image("float")
         if pixels is None or source.has_error:
-            raise OSError(f"{path}: must be a whole image: {_one_line(source.geterror())}")
+            raise OSError(f"{path}: must be a whole image: {one_line(source.geterror())}")
     pixels = np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
     if {"R", "G", "B"} <= set(spec.channelnames):
         pixels = pixels[:, :, [spec.channelnames.index(name) for name in "RGB"]]
@@ -510,3 +153,30 @@ def _read_colors(path: str | os.PathLike) -> tuple[np.ndarray, int]:
 
 def _from_srgb(pixels: np.ndarray) -> np.ndarray:
     return np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+# ---- files -----------------------------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def opened(path: str | os.PathLike) -> Iterator[Any]:
+    import OpenImageIO as oiio
+
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path}: file must exist. Check the path.")
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise OSError(f"{path}: must be an image: {one_line(oiio.geterror())}")
+    try:
+        yield source
+    finally:
+        source.close()
+
+
+def check_written(succeeded: bool, output: Any) -> None:
+    if not succeeded:
+        raise OSError(one_line(output.geterror()) or "writing failed")
+
+
+def one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import frazil as fz
-from frazil import image
+from frazil import exr
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +62,7 @@ def test_additive_layers_sum_to_the_beauty_within_half_precision(tmp_path, film)
 
 def test_halves_and_floats_by_choice(tmp_path, film):
     film.save(tmp_path / "a.exr", half_layers=["P"], float_layers=["beauty"])
-    layers = image.read_header(tmp_path / "a.exr")[2]
+    layers = exr.read_header(tmp_path / "a.exr")[2]
     assert set(layers["P"].values()) == {"half"}
     assert set(layers["beauty"].values()) == {"float"}
     with pytest.raises(KeyError, match="Did you mean 'beauty'"):

@@ -26,7 +26,7 @@ def grade_command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Only errors and warnings.")] = False,
 ) -> None:
     """Change lights, components, ramp colours and colours of a rendered EXR, without a render."""
-    from ..image import COMPRESSIONS
+    from ..exr import COMPRESSIONS
     from ..replacing import check_writable
 
     if output.suffix.lower() not in (".exr", ".png"):

@@ -90,7 +90,7 @@ def _kind(prim) -> str:
 
 
 def _describe_exr(file: Path) -> Iterator[str]:
-    from ..image import read_header
+    from ..exr import read_header
 
     width, height, layers, metadata = read_header(file)
     yield f"{file}: EXR, {width}x{height}, {metadata.pop('compression', 'none')}, {file.stat().st_size} bytes"

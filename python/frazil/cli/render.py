@@ -138,7 +138,7 @@ def render_command(
     """Render a USD stage to a layered OpenEXR and a PNG preview."""
     # What can be refused without reading the scene is refused first.
     size = None if resolution is None else checked_resolution(resolution)
-    from ..image import COMPRESSIONS
+    from ..exr import COMPRESSIONS
     from ..rendering import ESTIMATORS
 
     one_of("--compression", compression, COMPRESSIONS)

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from frazil import image
+from frazil import exr
 from frazil.replacing import check_writable, replacing
 
 
 def write_old(path: Path) -> None:
-    image.write_exr(path, {"beauty": np.zeros((8, 8, 4), np.float32)}, {"beauty": "RGBA"})
+    exr.write_exr(path, {"beauty": np.zeros((8, 8, 4), np.float32)}, {"beauty": "RGBA"})
 
 
 def test_an_error_keeps_the_old_file_and_leaves_nothing_else(tmp_path):
@@ -73,10 +73,10 @@ def test_unwritable_paths_are_refused_by_name(tmp_path):
 
 WRITE_LARGE = """
 import sys, numpy as np
-from frazil import image
+from frazil import exr
 try:
     layer = np.random.default_rng(0).random((512, 512, 4), np.float32)
-    image.write_exr(sys.argv[1], {"beauty": layer}, {"beauty": "RGBA"}, compression="zip")
+    exr.write_exr(sys.argv[1], {"beauty": layer}, {"beauty": "RGBA"}, compression="zip")
 except OSError as error:
     print(error)
 """
@@ -91,7 +91,7 @@ def assert_old_file_is_whole(path: Path, printed: str) -> None:
     assert f"{path.name}: cannot be written" in printed
     assert "The old file, if any, is whole" in printed
     assert os.listdir(path.parent) == [path.name]
-    assert image.read_exr(path)[0]["beauty"].shape == (8, 8, 4)
+    assert exr.read_exr(path)[0]["beauty"].shape == (8, 8, 4)
 
 
 def test_a_write_that_fails_midway_keeps_the_old_file(tmp_path):
@@ -119,12 +119,12 @@ def test_a_full_disk_keeps_the_old_file(tmp_path):
 
 WRITE_FOREVER = """
 import sys, numpy as np
-from frazil import image
+from frazil import exr
 value = 0
 while True:
     value += 1
     layer = np.full((256, 256, 4), value, np.float32)
-    image.write_exr(sys.argv[1], {"beauty": layer}, {"beauty": "RGBA"}, compression="none")
+    exr.write_exr(sys.argv[1], {"beauty": layer}, {"beauty": "RGBA"}, compression="none")
 """
 
 
@@ -141,7 +141,7 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path):
         time.sleep(0.3 * random.random())
         writer.send_signal(signal.SIGKILL)
         writer.wait()
-        beauty = image.read_exr(path)[0]["beauty"]
+        beauty = exr.read_exr(path)[0]["beauty"]
         assert beauty.min() == beauty.max() > 0
         written.append(beauty.max())
     assert max(written) > 1  # the writers were killed in the middle of their work
