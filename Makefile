@@ -111,7 +111,8 @@ quick: test-cpp $(STAMPS)/test ## Run all tests but the slow ones
 	@pytest -m "not slow"
 
 sanitize: $(STAMPS)/runtime ## Run the C++ tests under AddressSanitizer and UBSan
-	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DFRAZIL_BUILD_TESTS=ON -DFRAZIL_SANITIZE=ON
+	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \
+	    -DFRAZIL_BUILD_TESTS=ON -DFRAZIL_SANITIZE=ON
 	@cmake --build build/sanitize --target frazil_tests
 	@UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 ctest --test-dir build/sanitize --output-on-failure
 
