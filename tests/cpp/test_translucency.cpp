@@ -81,13 +81,15 @@ TEST_CASE("gather kernel: SIMD equals the scalar path, for every instruction set
     SourceList list;
     const PointSet points = sphere_points(100, 0.2f);
     for (const V3f& p : points.positions) {
+        list.powers.push_back(nullptr);
         list.sources.push_back(
             {{p.x, p.y, p.z}, {1e-4f, 2e-4f, 1e-4f, 5e-5f, -3e-5f, 1e-5f}, 4e-4f, 0.005f, {0.1f, 0.2f, 0.3f}});
         for (std::size_t g = 0; g < groups; ++g) {
             const float power = 0.01f * (1.0f + g) * (1.5f + p.z);
-            list.powers.push_back({{power, 2.0f * power, 3.0f * power}, {0.01f, -0.005f, 0.002f * g}});
+            list.own.push_back({{power, 2.0f * power, 3.0f * power}, {0.01f, -0.005f, 0.002f * g}});
         }
     }
+    list.settle(groups);
     for (const std::int64_t target : {HWY_SSSE3, HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
         if (!(hwy::SupportedTargets() & target)) continue;
         const OnlyTarget only(target);

@@ -24,6 +24,7 @@ constexpr float kNothingIsSmooth = std::numeric_limits<float>::max();
 // Of a cluster's largest squared radius, what a single footprint may have before it is cut. Coverage on a plane is the
 // same within 3e-4 from 0.05 to 0.6, at a seventh of the time.
 constexpr float kDiscShare = 0.6f;
+constexpr std::size_t kCacheLine = 64;
 
 float squared_distance(const Box3f& box, const V3f& p) {
     float q = 0.0f;
@@ -34,8 +35,20 @@ float squared_distance(const Box3f& box, const V3f& p) {
     return q;
 }
 
+// Power of `area` that is lit so, centred `offset` from the centroid.
+GroupPower group_power(const Rgb& irradiance, float area, const V3f& offset) {
+    return {{irradiance.x * area, irradiance.y * area, irradiance.z * area},
+            {2.0f * offset.x, 2.0f * offset.y, 2.0f * offset.z}};
+}
+
 // Chooses the clusters and points that stand for the surface as seen from a block of shading points.
 struct Cut {
+    // A node that stands for its points, or a leaf that its points stand for.
+    struct Pick {
+        std::uint32_t node;
+        bool is_cluster, is_far;
+    };
+
     const PointTree::Impl& tree;
     const OpeningRule* rule;
     bool has_footprints;
@@ -44,24 +57,17 @@ struct Cut {
     SourceList near{}, far{};
     SourceList* list = nullptr;  // where sources go just now
     std::vector<std::uint32_t> stack{};
+    std::vector<Pick> picks{};
     std::vector<V2f> leans{};  // of each group's power in the cell that is being cut
 
     const PointClusters& clusters() const { return *tree.clusters; }
 
-    // Room for the powers of the last source, one a group.
-    GroupPower* add_powers() {
-        const std::size_t first = list->powers.size();
-        list->powers.resize(first + tree.groups);
-        return &list->powers[first];
-    }
-
-    // One group's power of a source, and how far its centre lies from that of the area.
-    static void set_power(GroupPower& to, const float* power, float scale, const V3f& offset, float* all) {
-        for (int c = 0; c < 3; ++c) {
-            to.power[c] = power[c] * scale;
-            all[c] += std::abs(to.power[c]);
+    // The magnitude of a source's light, which the rule needs where a ramp hides it.
+    void add_magnitude(const GroupPower* powers) {
+        if (tree.kernel->ramp.is_empty()) return;
+        for (std::size_t g = 0; g < tree.groups; ++g) {
+            for (int c = 0; c < 3; ++c) list->sources.back().power[c] += std::abs(powers[g].power[c]);
         }
-        to.offset = {2.0f * offset.x, 2.0f * offset.y, 2.0f * offset.z};
     }
 
     void add_cluster(std::uint32_t index) {
@@ -73,12 +79,9 @@ struct Cut {
         for (int i = 0; i < 6; ++i) source.covariance[i] = area.covariance[i] * scale;
         source.trace = node.trace * scale;
         source.area = area.area;
-        const float reach = lean_reach(node);
-        GroupPower* to = add_powers();
-        for (std::size_t g = 0; g < tree.groups; ++g) {
-            set_power(to[g], &tree.node_powers[3 * (index * tree.groups + g)], 1.0f,
-                      tree.node_power_offset(index, g, reach), source.power.data());
-        }
+        source.power = {};
+        list->powers.push_back(&tree.node_powers[index * tree.groups]);
+        add_magnitude(list->powers.back());
     }
 
     // A part of a point's cell about `center`: `share` of its area. Its powers are for the caller to add.
@@ -98,12 +101,12 @@ struct Cut {
     // A cell in one piece.
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared) {
         add_part(p, cell, clusters().positions[p], 1.0f, largest_squared);
-        GroupPower* to = add_powers();
+        GroupPower* to = list->add_own(tree.groups);
         for (std::size_t g = 0; g < tree.groups; ++g) {
             const V3f offset = has_footprints ? tree.power_offset(p, g, lean_reach(cell.trace)) : V3f(0.0f);
-            set_power(to[g], &tree.irradiance[p * tree.groups + g].x, clusters().areas[p], offset,
-                      list->sources.back().power.data());
+            to[g] = group_power(tree.irradiance[p * tree.groups + g], clusters().areas[p], offset);
         }
+        add_magnitude(to);
     }
 
     // A cell that is large against the kernel is cut into seven parts of equal area with the same second moments together.
@@ -112,16 +115,16 @@ struct Cut {
         if (2.0f * cell.trace * share <= largest_squared || share < 1e-3f) {
             const V3f center = clusters().positions[p] + frame.axes[0] * z.x + frame.axes[1] * z.y;
             add_part(p, cell, center, share, largest_squared);
-            GroupPower* to = add_powers();
+            GroupPower* to = list->add_own(tree.groups);
             for (std::size_t g = 0; g < tree.groups; ++g) {
                 const V2f& lean = leans[g];
                 const float weight = power_at(lean, z);
                 // The centre of power within the part.
                 const float within = weight > 0.25f ? share / weight : 0.0f;
-                set_power(to[g], &tree.irradiance[p * tree.groups + g].x, clusters().areas[p] * share * weight,
-                          (frame.axes[0] * lean.x + frame.axes[1] * lean.y) * within,
-                          list->sources.back().power.data());
+                to[g] = group_power(tree.irradiance[p * tree.groups + g], clusters().areas[p] * share * weight,
+                                    (frame.axes[0] * lean.x + frame.axes[1] * lean.y) * within);
             }
+            add_magnitude(to);
             return;
         }
         add_split(p, cell, frame, z, share / 7.0f, largest_squared);
@@ -157,9 +160,20 @@ struct Cut {
         }
     }
 
+    // What evaluation reads of a node.
+    void prefetch(std::uint32_t index) const {
+        const auto touch = [](const auto* first, std::size_t count) {
+            const auto* bytes = reinterpret_cast<const char*>(first);
+            for (std::size_t at = 0; at < count * sizeof(*first); at += kCacheLine) __builtin_prefetch(bytes + at);
+            __builtin_prefetch(bytes + count * sizeof(*first) - 1);
+        };
+        touch(&clusters().areas_of_nodes[index], 1);
+        touch(&tree.node_powers[index * tree.groups], tree.groups);
+    }
+
     void build(const Box3f& box) {
-        near.clear();
-        far.clear();
+        // Choose first, while what the sources are made of comes from memory.
+        picks.clear();
         stack.assign(1, 0);
         while (!stack.empty()) {
             const std::uint32_t index = stack.back();
@@ -170,15 +184,22 @@ struct Cut {
             if (q > beyond * beyond) continue;
             const float squared = node.radius * node.radius + (has_footprints ? 4.0f * node.footprint : 0.0f);
             const float largest = rule->largest_squared(q);
-            list = smooth_squared <= largest ? &far : &near;
-            if (squared <= largest && (!node.is_leaf() || node.size() > 1)) {
-                add_cluster(index);
-            } else if (node.is_leaf()) {
-                add_points(node, box);
+            const bool is_cluster = squared <= largest && (!node.is_leaf() || node.size() > 1);
+            if (is_cluster || node.is_leaf()) {
+                picks.push_back({index, is_cluster, smooth_squared <= largest});
+                if (is_cluster) prefetch(index);
             } else {
                 for (std::uint32_t k = node.size(); k-- > 0;) stack.push_back(node.first + k);
             }
         }
+        near.clear();
+        far.clear();
+        for (const Pick& pick : picks) {
+            list = pick.is_far ? &far : &near;
+            pick.is_cluster ? add_cluster(pick.node) : add_points(clusters().nodes[pick.node], box);
+        }
+        near.settle(tree.groups);
+        far.settle(tree.groups);
     }
 };
 
@@ -187,11 +208,15 @@ std::size_t darkness_level(const PointTree::Impl& tree, const SumRows& sums) {
     float darkest = 1.0f;
     for (std::size_t c = 0; c < 3; ++c) {
         float mean = 0.0f;
-        for (std::size_t g = 0; g < tree.groups; ++g) mean += std::abs(tree.node_powers[3 * g + c]);
+        for (std::size_t g = 0; g < tree.groups; ++g) mean += std::abs(tree.node_powers[g].power[c]);
         if (!(mean > 0.0f)) continue;
         mean /= tree.clusters->areas_of_nodes[0].area;
         for (std::size_t i = 0; i < sums.size(); ++i) {
-            const float expected = mean * sums.coverage(i)[c], arrives = std::abs(sums.unshaded(i)[c]);
+            float arrives = std::abs(sums.unshaded(i)[c]);
+            if (tree.kernel->ramp.is_empty()) {
+                for (std::size_t g = 0; g < tree.groups; ++g) arrives += std::abs(sums.exitance(i)[3 * g + c]);
+            }
+            const float expected = mean * sums.coverage(i)[c];
             if (arrives < darkest * expected) darkest = arrives / expected;
         }
     }

@@ -46,10 +46,10 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
             for (int c = 0; c < 3; ++c) {
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;
-                unshaded[c] += double(even) * source.power[c];
                 // The kernel with its ramp, and its derivative in q.
                 float lit = even, lit_slope = f.slope;
                 if (!ramp.is_flat) {
+                    unshaded[c] += double(even) * source.power[c];
                     // Average each hinge over a uniform spread of distances.
                     float color = ramp.first[c], slope = 0.0f;
                     for (const auto& hinge : ramp.hinges) {
@@ -63,7 +63,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                 }
                 coverage[c] += double(even) * source.area;
                 for (std::size_t g = 0; g < groups; ++g) {
-                    const GroupPower& lamp = list.powers[s * groups + g];
+                    const GroupPower& lamp = list.powers[s][g];
                     const float lean = dx * lamp.offset[0] + dy * lamp.offset[1] + dz * lamp.offset[2];
                     exitance[3 * g + c] += double(lit + lit_slope * lean) * lamp.power[c];
                 }

@@ -25,7 +25,7 @@ struct Source {
     std::array<float, 6> covariance;  // xx, yy, zz, and twice xy, xz, yz
     float trace;                      // of the covariance
     float area;
-    std::array<float, 3> power;  // of all groups together, in magnitude
+    std::array<float, 3> power;  // of all groups together, in magnitude; needed with a ramp alone
 };
 
 // One light group's power of a source.
@@ -34,14 +34,31 @@ struct GroupPower {
     std::array<float, 3> offset;  // twice the way from the source's center to the centre of this power
 };
 
-// Sources of one block with their powers, (sources, groups).
+// Sources of one block with their powers.
 struct SourceList {
     std::vector<Source> sources;
-    std::vector<GroupPower> powers;
+    std::vector<const GroupPower*> powers;  // of each source, one a group; null: the next of the list's own
+    std::vector<GroupPower> own;
 
     void clear() {
         sources.clear();
         powers.clear();
+        own.clear();
+    }
+    // Room in the list for the powers of the last source, until the next call.
+    GroupPower* add_own(std::size_t groups) {
+        powers.push_back(nullptr);
+        own.resize(own.size() + groups);
+        return &own[own.size() - groups];
+    }
+    // Find the list's own powers, now that they stay where they are.
+    void settle(std::size_t groups) {
+        const GroupPower* next = own.data();
+        for (const GroupPower*& at : powers) {
+            if (at) continue;
+            at = next;
+            next += groups;
+        }
     }
 };
 
@@ -50,7 +67,7 @@ struct BlockSums {
     alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
     std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
     alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
-    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // by the power of all groups, without ramp
+    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // with a ramp: by the power of all groups, without it
     std::vector<float> exitance;
 
     void clear(std::size_t groups) {
@@ -73,6 +90,8 @@ struct BlockSums {
 // The sums of shading points, one row each: exitance (groups, 3), coverage (3), unshaded (3), and zeros up to the stride.
 class SumRows {
   public:
+    static constexpr std::size_t kStep = 16;  // strides are multiples of it
+
     void reset(std::size_t count, std::size_t groups) {
         count_ = count;
         row_ = 3 * groups;
@@ -80,8 +99,9 @@ class SumRows {
     }
     std::size_t size() const { return count_; }
     std::size_t used() const { return row_ + 6; }
-    std::size_t stride() const { return (used() + 7) / 8 * 8; }
+    std::size_t stride() const { return (used() + kStep - 1) / kStep * kStep; }
     float* data() { return values_.data(); }
+    const float* data() const { return values_.data(); }
     const float* exitance(std::size_t i) const { return &values_[i * stride()]; }
     const float* coverage(std::size_t i) const { return exitance(i) + row_; }
     const float* unshaded(std::size_t i) const { return coverage(i) + 3; }

@@ -19,7 +19,7 @@ constexpr std::size_t kTile = 32;  // sources whose shares are summed before the
 
 // One coefficient of the segment that each lane is in.
 HWY_INLINE FloatV look_up(const float* HWY_RESTRICT row, IntV segment) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3  // and what goes beyond it
     return FloatV{_mm512_permutex2var_ps(_mm512_load_ps(row), segment.raw, _mm512_load_ps(row + 16))};
 #else
     return hn::GatherIndex(Float(), row, segment);
@@ -49,10 +49,10 @@ struct TileShares {
     float kernel[3][kTile * kBlockLanes], slope[3][kTile * kBlockLanes], way[3][kTile * kBlockLanes];
 };
 
-// Add the light of kGroups groups, one after the other in `powers`, whose rows hold `groups`.
+// Add the light of kGroups groups from `begin` on.
 template <int kGroups>
-HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources, const GroupPower* HWY_RESTRICT powers,
-                           std::size_t groups, float* HWY_RESTRICT lit) {
+HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources,
+                           const GroupPower* const* HWY_RESTRICT powers, std::size_t begin, float* HWY_RESTRICT lit) {
     const Float d;
     const std::size_t lanes = hn::Lanes(d);
     FloatV sum[3 * kGroups];
@@ -64,8 +64,9 @@ HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources, const 
                      k2 = hn::Load(d, shares.kernel[2] + i * lanes);
         const FloatV s0 = hn::Load(d, shares.slope[0] + i * lanes), s1 = hn::Load(d, shares.slope[1] + i * lanes),
                      s2 = hn::Load(d, shares.slope[2] + i * lanes);
+        const GroupPower* HWY_RESTRICT lamps = powers[i] + begin;
         for (int g = 0; g < kGroups; ++g) {
-            const auto& [p, o] = powers[i * groups + g];
+            const auto& [p, o] = lamps[g];
             const FloatV lean =
                 hn::MulAdd(z, hn::Set(d, o[2]), hn::MulAdd(y, hn::Set(d, o[1]), hn::Mul(x, hn::Set(d, o[0]))));
             sum[3 * g] = hn::MulAdd(hn::MulAdd(s0, lean, k0), hn::Set(d, p[0]), sum[3 * g]);
@@ -157,11 +158,11 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                     const FloatV value = hn::MulAdd(v1, t, c0), slope = hn::MulAdd(s1, t, v1),
                                  bend = hn::MulAdd(h1, t, s1);
                     const FloatV even = hn::MulAdd(bend, by_curvature, hn::MulAdd(slope, by_slope, value));
-                    FloatV& unshaded = channel == 0 ? unshaded0 : channel == 1 ? unshaded1 : unshaded2;
-                    unshaded = hn::MulAdd(even, hn::Set(d, source.power[channel]), unshaded);
                     // The kernel with its ramp, and its derivative in q.
                     FloatV lit = even, lit_slope = hn::Mul(slope, slope_scale);
                     if constexpr (kHasRamp) {
+                        FloatV& unshaded = channel == 0 ? unshaded0 : channel == 1 ? unshaded1 : unshaded2;
+                        unshaded = hn::MulAdd(even, hn::Set(d, source.power[channel]), unshaded);
                         FloatV color, color_slope;
                         shade(ramp, channel, mean_r, half_width, inverse_width, color, color_slope);
                         lit = hn::MulAdd(even, color, hn::Mul(hn::Mul(slope, spread), color_slope));
@@ -180,20 +181,21 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
             covered += kBlockLanes;
             hn::Store(hn::Add(hn::Load(d, covered), coverage2), d, covered);
 
-            float* whole = block.unshaded[0].data() + first;
-            hn::Store(hn::Add(hn::Load(d, whole), unshaded0), d, whole);
-            whole += kBlockLanes;
-            hn::Store(hn::Add(hn::Load(d, whole), unshaded1), d, whole);
-            whole += kBlockLanes;
-            hn::Store(hn::Add(hn::Load(d, whole), unshaded2), d, whole);
+            if constexpr (kHasRamp) {
+                float* whole = block.unshaded[0].data() + first;
+                hn::Store(hn::Add(hn::Load(d, whole), unshaded0), d, whole);
+                whole += kBlockLanes;
+                hn::Store(hn::Add(hn::Load(d, whole), unshaded1), d, whole);
+                whole += kBlockLanes;
+                hn::Store(hn::Add(hn::Load(d, whole), unshaded2), d, whole);
+            }
 
             // Every group's three channels from the same kernels.
-            const GroupPower* powers = list.powers.data() + tile * groups;
+            const GroupPower* const* powers = list.powers.data() + tile;
             float* lit = block.exitance.data() + first;
             std::size_t g = 0;
-            for (; g + 4 <= groups; g += 4)
-                add_groups<4>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
-            for (; g < groups; ++g) add_groups<1>(shares, tile_size, powers + g, groups, lit + 3 * g * kBlockLanes);
+            for (; g + 4 <= groups; g += 4) add_groups<4>(shares, tile_size, powers, g, lit + 3 * g * kBlockLanes);
+            for (; g < groups; ++g) add_groups<1>(shares, tile_size, powers, g, lit + 3 * g * kBlockLanes);
         }
     }
 }

@@ -15,20 +15,34 @@ namespace frazil::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// out (rows, stride) = left (rows, inner) times right (inner, stride); stride a multiple of 8.
-void multiply_here(const float* HWY_RESTRICT left, std::size_t rows, std::size_t inner, const float* HWY_RESTRICT right,
-                   std::size_t stride, float* HWY_RESTRICT out) {
-    const hn::CappedTag<float, 8> d;
+// out (rows, stride) = left (rows, kInner) times right (kInner, stride).
+template <std::size_t kInner>
+void multiply(const float* HWY_RESTRICT left, std::size_t rows, const float* HWY_RESTRICT right, std::size_t stride,
+              float* HWY_RESTRICT out) {
+    const hn::CappedTag<float, SumRows::kStep> d;
     const std::size_t lanes = hn::Lanes(d);
-    for (std::size_t row = 0; row < rows; ++row, left += inner, out += stride) {
-        for (std::size_t at = 0; at < stride; at += lanes) {
-            auto sum = hn::Zero(d);
-            for (std::size_t k = 0; k < inner; ++k) {
-                sum = hn::MulAdd(hn::Set(d, left[k]), hn::LoadU(d, right + k * stride + at), sum);
+    for (std::size_t at = 0; at < stride; at += lanes) {
+        hn::Vec<decltype(d)> column[kInner];
+        for (std::size_t k = 0; k < kInner; ++k) column[k] = hn::LoadU(d, right + k * stride + at);
+        for (std::size_t row = 0; row < rows; ++row) {
+            auto even = hn::Zero(d), odd = hn::Zero(d);
+            for (std::size_t k = 0; k < kInner; k += 2) {
+                even = hn::MulAdd(hn::Set(d, left[row * kInner + k]), column[k], even);
+                odd = hn::MulAdd(hn::Set(d, left[row * kInner + k + 1]), column[k + 1], odd);
             }
-            hn::StoreU(sum, d, out + at);
+            hn::StoreU(hn::Add(even, odd), d, out + row * stride + at);
         }
     }
+}
+
+// The coefficients of values at nodes, and what they are at places.
+void fit_here(const float* fit, const SumRows& nodes, SumRows& coefficients) {
+    static_assert(LocalExpansion::kNodes % 2 == 0);
+    multiply<LocalExpansion::kNodes>(fit, LocalExpansion::kTerms, nodes.data(), nodes.stride(), coefficients.data());
+}
+void eval_here(const float* terms, const SumRows& coefficients, SumRows& sums) {
+    static_assert(LocalExpansion::kTerms % 2 == 0);
+    multiply<LocalExpansion::kTerms>(terms, sums.size(), coefficients.data(), coefficients.stride(), sums.data());
 }
 
 }  // namespace frazil::HWY_NAMESPACE
@@ -38,7 +52,8 @@ HWY_AFTER_NAMESPACE();
 namespace frazil {
 namespace {
 
-HWY_EXPORT(multiply_here);
+HWY_EXPORT(fit_here);
+HWY_EXPORT(eval_here);
 
 constexpr std::size_t kNodes = LocalExpansion::kNodes, kTerms = LocalExpansion::kTerms;
 constexpr float kCorner = 0.8f;  // of half a side
@@ -106,8 +121,7 @@ void LocalExpansion::fit(const BlockSums& nodes, std::size_t groups) {
     values_.reset(kNodes, groups);
     values_.add(0, nodes);
     coefficients_.reset(kTerms, groups);
-    HWY_DYNAMIC_DISPATCH(multiply_here)
-    (fit.data(), kTerms, kNodes, values_.data(), values_.stride(), coefficients_.data());
+    HWY_DYNAMIC_DISPATCH(fit_here)(fit.data(), values_, coefficients_);
 }
 
 void LocalExpansion::eval(const std::vector<V3f>& positions, SumRows& sums) {
@@ -118,8 +132,7 @@ void LocalExpansion::eval(const std::vector<V3f>& positions, SumRows& sums) {
             p[axis] = std::clamp(p[axis], -1.0f, 1.0f);  // far from the origin, rounding
         terms_of(p.x, p.y, p.z, &terms_[i * kTerms]);
     }
-    HWY_DYNAMIC_DISPATCH(multiply_here)
-    (terms_.data(), positions.size(), kTerms, coefficients_.data(), coefficients_.stride(), sums.data());
+    HWY_DYNAMIC_DISPATCH(eval_here)(terms_.data(), coefficients_, sums);
 }
 
 }  // namespace frazil

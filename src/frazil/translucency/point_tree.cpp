@@ -81,9 +81,8 @@ void sum_power(PointTree::Impl& tree, std::uint32_t n) {
     const PointClusters& clusters = *tree.clusters;
     const TreeNode& node = clusters.nodes[n];
     const std::size_t groups = tree.groups;
-    const float reach = lean_reach(node);
     for (std::size_t g = 0; g < groups; ++g) {
-        float* powers = &tree.node_powers[3 * (n * groups + g)];
+        auto& [powers, offset] = tree.node_powers[n * groups + g];
         PowerCentre centre;
         for (std::uint32_t k = node.first; k < node.first + node.size(); ++k) {
             Rgb part;
@@ -92,15 +91,16 @@ void sum_power(PointTree::Impl& tree, std::uint32_t n) {
                 part = tree.irradiance[k * groups + g] * clusters.areas[k];
                 at = clusters.positions[k] + tree.power_offset(k, g, lean_reach(PointCell(clusters, k).trace));
             } else {
-                const float* power = &tree.node_powers[3 * (k * groups + g)];
-                part = {power[0], power[1], power[2]};
-                at = clusters.nodes[k].center + tree.node_power_offset(k, g, lean_reach(clusters.nodes[k]));
+                const GroupPower& child = tree.node_powers[k * groups + g];
+                part = {child.power[0], child.power[1], child.power[2]};
+                at = clusters.nodes[k].center + V3f(child.offset[0], child.offset[1], child.offset[2]) * 0.5f;
             }
             for (int c = 0; c < 3; ++c) powers[c] += part[c];
             centre.add(&part.x, V3d(at) - V3d(node.center));
         }
         if (centre.is_dark()) continue;
-        tree.node_leans[n * groups + g] = packed_lean(V3f(centre.mean()), reach);
+        const V3f twice(centre.mean() * 2.0);
+        offset = {twice.x, twice.y, twice.z};
     }
 }
 
@@ -137,7 +137,7 @@ PointTree::PointTree(const PointSet& points, std::vector<Rgb> irradiance, std::s
 
 PointTree::PointTree(std::shared_ptr<const PointClusters> of_clusters, std::shared_ptr<const TreeKernel> kernel,
                      const std::vector<Rgb>& irradiance, std::size_t groups, const std::vector<V3f>& moments)
-    : impl_(new Impl{std::move(of_clusters), std::move(kernel), groups, 0, {}, {}, {}, {}}) {
+    : impl_(new Impl{std::move(of_clusters), std::move(kernel), groups, 0, {}, {}, {}}) {
     Impl& tree = *impl_;
     const PointClusters& clusters = *tree.clusters;
     check_light(clusters.source_count, irradiance.size(), groups, moments.size());
@@ -169,8 +169,7 @@ PointTree::PointTree(std::shared_ptr<const PointClusters> of_clusters, std::shar
     for (const std::uint32_t here : unlit) tree.dropped += here;
 
     // Sum it upwards.
-    tree.node_powers.assign(clusters.nodes.size() * 3 * groups, 0.0f);
-    tree.node_leans.resize(clusters.nodes.size() * groups);
+    tree.node_powers.assign(clusters.nodes.size() * groups, GroupPower{});
     for (std::size_t level = clusters.level_begin.size() - 1; level-- > 0;) {
         const std::uint32_t first = clusters.level_begin[level];
         parallel_for(clusters.level_begin[level + 1] - first, 512, [&](std::size_t begin, std::size_t end) {

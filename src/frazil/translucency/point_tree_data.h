@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/translucency/gather_kernel.h"
 #include "frazil/translucency/kernel_table.h"
 #include "frazil/translucency/opening_rule.h"
 #include "frazil/translucency/point_clusters.h"
@@ -19,15 +20,12 @@
 
 namespace frazil {
 
-// From a centroid to a centre of power, in parts of 32767 of how far it can be.
+// From a cell's centroid to a centre of power, in parts of 32767 of how far it can be.
 using PowerLean = std::array<std::int16_t, 3>;
 
-// How far from a cell's centroid, or a node's, the centre of a power can be.
+// How far from a cell's centroid the centre of a power can be.
 inline float lean_reach(float cell_trace) {
     return 2.0f * std::sqrt(cell_trace);
-}
-inline float lean_reach(const TreeNode& node) {
-    return node.radius + 4.0f * std::sqrt(node.footprint);
 }
 
 // Irradiance that arrives, against what the coverage would bring of the mean irradiance: steps of it, each with a stricter
@@ -56,22 +54,14 @@ struct PointTree::Impl {
     std::shared_ptr<const TreeKernel> kernel;
     std::size_t groups = 1, dropped = 0;
 
-    std::vector<Rgb> irradiance;        // (points, groups), in the clusters' order
-    std::vector<PowerLean> leans;       // (points, groups); empty where light is known at points alone
-    std::vector<float> node_powers;     // (nodes, 3 groups): Σ E A
-    std::vector<PowerLean> node_leans;  // (nodes, groups)
+    std::vector<Rgb> irradiance;          // (points, groups), in the clusters' order
+    std::vector<PowerLean> leans;         // (points, groups); empty where light is known at points alone
+    std::vector<GroupPower> node_powers;  // (nodes, groups): Σ E A, and where it is centred
 
-    // From the centroid of a point's cell, or of a node's area, to the centre of a group's power; `reach` is lean_reach()
-    // of that cell or node.
+    // From the centroid of a point's cell to the centre of a group's power; `reach` is lean_reach() of that cell.
     V3f power_offset(std::uint32_t point, std::size_t group, float reach) const {
-        return leans.empty() ? V3f(0.0f) : unpacked(leans[point * groups + group], reach);
-    }
-    V3f node_power_offset(std::uint32_t node, std::size_t group, float reach) const {
-        return unpacked(node_leans[node * groups + group], reach);
-    }
-
-  private:
-    static V3f unpacked(const PowerLean& lean, float reach) {
+        if (leans.empty()) return V3f(0.0f);
+        const PowerLean& lean = leans[point * groups + group];
         const float unit = reach * (1.0f / 32767.0f);
         return {lean[0] * unit, lean[1] * unit, lean[2] * unit};
     }
