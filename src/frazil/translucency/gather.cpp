@@ -16,8 +16,9 @@ namespace frazil {
 namespace {
 
 constexpr std::size_t kBlockStep = 16;
-constexpr float kWidestBlock = 4.0f;       // in mean free paths, beyond kBlockStep shading points
-constexpr std::size_t kChunk = 2048;       // shading points whose blocks one thread chooses
+constexpr float kWidestBlock = 4.0f;  // in mean free paths, beyond kBlockStep shading points
+// Shading points whose blocks one thread chooses, each by the rule of the one before: of many, more.
+constexpr std::size_t kChunk = 2048, kLargestChunk = 8192, kChunks = 64;
 constexpr std::size_t kBlockPoints = 128;  // at most
 // Half a block's diagonal that a source is smooth across, over the radius of a cluster that may stand for it, squared.
 constexpr float kSmooth = 0.7f;
@@ -298,7 +299,8 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     std::vector<RampHinges> hats;
     for (std::size_t k = 0; k < out.knots; ++k) hats.push_back(hinges_of(hat(kernel.ramp, k), Rgb(1.0f)));
     const auto widest = static_cast<float>(kWidestBlock * shortest_mean_free_path(kernel.profile));
-    parallel_for(order.size(), kChunk, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+    const std::size_t chunk = std::clamp(order.size() / kChunks, kChunk, kLargestChunk);
+    parallel_for(order.size(), chunk, [&](std::size_t chunk_begin, std::size_t chunk_end) {
         Cut cut{tree, rules.data(), options.estimator == Estimator::noise_free};
         BlockSums lanes;
         LocalExpansion expansion;

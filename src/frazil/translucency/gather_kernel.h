@@ -67,7 +67,8 @@ struct BlockSums {
     alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
     std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
     alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
-    alignas(64) std::array<std::array<float, kBlockLanes>, 3> unshaded{};  // with a ramp: by the power of all groups, without it
+    alignas(64) std::array<std::array<float, kBlockLanes>,
+                           3> unshaded{};  // with a ramp: by the power of all groups, without it
     std::vector<float> exitance;
 
     void clear(std::size_t groups) {

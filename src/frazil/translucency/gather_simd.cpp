@@ -51,8 +51,8 @@ struct TileShares {
 
 // Add the light of kGroups groups from `begin` on.
 template <int kGroups>
-HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources,
-                           const GroupPower* const* HWY_RESTRICT powers, std::size_t begin, float* HWY_RESTRICT lit) {
+HWY_INLINE void add_groups(const TileShares& shares, std::size_t sources, const GroupPower* const* HWY_RESTRICT powers,
+                           std::size_t begin, float* HWY_RESTRICT lit) {
     const Float d;
     const std::size_t lanes = hn::Lanes(d);
     FloatV sum[3 * kGroups];
