@@ -226,7 +226,7 @@ def test_values_out_of_range_are_named_with_prim_and_range(stage, tmp_path):
     _, said = refer(stage, tmp_path, surface("frazil_ice", value("roughness", "float", "3")))
     assert said == ["/Looks/Mine/shader: roughness must be in 0..1, got 3. 1 is used."]
     _, said = refer(stage, tmp_path, surface("open_pbr_surface", value("specular_roughness", "float", "-1")))
-    assert said == ["/Looks/Mine/shader: roughness must be in 0..1, got -1. 0 is used."]
+    assert said == ["/Looks/Mine/shader: specular_roughness must be in 0..1, got -1. 0 is used."]
 
 
 def test_dangling_connections_are_named(stage, tmp_path):

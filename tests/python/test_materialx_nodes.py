@@ -187,6 +187,7 @@ FOUND = {
     <input name="base_color" type="color3" nodegraph="NG_brass1" output="out_color" />
     <input name="specular_roughness" type="float" nodegraph="NG_brass1" output="out_roughness" />
     <input name="metalness" type="float" value="1" />
+    <input name="coat" type="float" value="1" />
     <input name="coat_color" type="color3" nodegraph="NG_brass1" output="out_color" />
   </standard_surface>
   <surfacematerial name="Look" type="material">

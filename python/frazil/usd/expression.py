@@ -58,8 +58,11 @@ class Expression:
 
     @staticmethod
     def constant(value) -> Expression:
-        """Of a number, a vector or a colour."""
-        return Expression(np.atleast_1d(np.asarray(value, np.float64)).reshape(-1))
+        """Of a number, a vector or a colour; ValueError or TypeError where it is none."""
+        numbers = np.atleast_1d(np.asarray(value, np.float64)).reshape(-1)
+        if not 1 <= numbers.size <= 4:
+            raise ValueError(f"a value must have 1 to 4 numbers, got {numbers.size}")
+        return Expression(numbers)
 
     @property
     def width(self) -> int:
@@ -67,7 +70,9 @@ class Expression:
         return len(self.bias)
 
     def component(self, *indices: int) -> Expression:
-        """Some of its numbers; a single number repeats."""
+        """Some of its numbers; a single number repeats. ValueError where it has not so many."""
+        if self.width > 1 and max(indices) >= self.width:
+            raise ValueError(f"a value of {max(indices) + 1} numbers is wanted, got one of {self.width}")
         at = [i if self.width > 1 else 0 for i in indices]
         if self.image is None:
             return replace(self, bias=self.bias[at])
@@ -86,7 +91,9 @@ class Expression:
         return self
 
     def affine(self, scale, bias) -> Expression:
-        """self * scale + bias, with constants."""
+        """self * scale + bias, with constants. ValueError for displayColor, which stays as it is."""
+        if self.is_display_color:
+            raise ValueError("displayColor takes no arithmetic")
         scale, bias = np.asarray(scale, np.float64), np.asarray(bias, np.float64)
         wide = self.widened(max(scale.size, bias.size))
         if wide.image is None:
@@ -101,6 +108,16 @@ class Expression:
             for i, c in enumerate(self.channels)
         ]
         return np.stack(planes, axis=-1)
+
+    def key(self) -> tuple:
+        """What tells it from others."""
+        return (self.image.key if self.image else None, self.channels, tuple(self.scale), tuple(self.bias))
+
+    def mean(self) -> np.ndarray:
+        """Its numbers; the mean over all texels of an image."""
+        if self.image is None:
+            return self.bias
+        return np.mean([self.evaluate(n).mean(axis=(0, 1)) for n in sorted(self.image.tiles)], axis=0)
 
     # -- for materials
 
@@ -154,7 +171,9 @@ def image_expression(image: Image, channels: list[int], scale, bias, placement: 
 
 
 def combine(parts: list[Expression], context: ReadContext, owner) -> Expression:
-    """Single numbers side by side."""
+    """Single numbers side by side. ValueError for displayColor."""
+    if any(p.is_display_color for p in parts):
+        raise ValueError("displayColor takes no arithmetic")
     images = {id(p.image): p for p in parts if p.image is not None}
     if not images:
         return Expression(np.concatenate([p.bias[:1] for p in parts]))
@@ -174,6 +193,8 @@ def bake(
     arguments: list[Expression], function: Callable[..., np.ndarray], name: str, context: ReadContext, owner
 ) -> Expression:
     """function(arguments), worked out now for constants, else texel by texel as the images are read."""
+    if any(a.is_display_color for a in arguments):
+        raise ValueError("displayColor takes no arithmetic")
     imaged = [a for a in arguments if a.image is not None]
     if not imaged:
         with np.errstate(all="ignore"):
@@ -202,17 +223,13 @@ def bake(
         probe = np.asarray(function(*[np.ones((1, 1, a.width), np.float32) for a in arguments]))
     width = min(probe.shape[-1], 4)
     image = Image(
-        ("baked", name, *(_key(a) for a in arguments)),
+        ("baked", name, *(a.key() for a in arguments)),
         {n: (lambda n=n: load(n)) for n in numbers},
         3 if width == 2 else width,
         all(a.image.is_8_bit for a in imaged),
         notes=imaged[0].image.notes,
     )
     return Expression(np.zeros(width), np.ones(width), tuple(range(width)), image, placement)
-
-
-def _key(value: Expression) -> tuple:
-    return (value.image.key if value.image else None, value.channels, tuple(value.scale), tuple(value.bias))
 
 
 def _resized(values: np.ndarray, height: int, width: int) -> np.ndarray:

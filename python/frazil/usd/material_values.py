@@ -63,8 +63,12 @@ class ShaderValues:
             raw = reader.raw(shader, row.name)
             return row.default if raw is None else self._wrong(row, raw)
         self.authored.add(row.name)
+        try:
+            value = to_value(self._context, self._path, row, fed)
+        except (TypeError, ValueError):
+            return self._wrong(row, reader.raw(shader, row.name))
         self.expressions[row.name] = fed
-        return to_value(self._context, self._path, row, fed)
+        return value
 
     def _wrong(self, row: MaterialInput, value):
         self._context.warn(self._path, f"{row.name} must be a {row.kind}, got {value!r}. {row.default} is used.")
@@ -72,25 +76,51 @@ class ShaderValues:
 
 
 def to_value(context: ReadContext, path, row: MaterialInput, fed: Expression):
-    """What feeds the input as the core wants it; the row's default, after a warning, where it cannot be."""
+    """What feeds the input as the core wants it; the row's default, after a warning, where it cannot be.
+
+    TypeError or ValueError where it is of another type.
+    """
     if fed.is_display_color:
         return row.default
     if fed.image is None:
         if row.kind == "normal":
+            if not is_close(fed.widened(3).bias, (0.0, 0.0, 1.0)):
+                context.warn(path, f"{row.name} takes a texture alone, got {number_text(fed.bias)}. It is left out.")
             return None
         return to_constant(context, path, row, fed.bias)
     if not row.takes_texture:
         context.warn(path, f"{row.name} takes no texture. {row.default} is used.")
         return row.default
     scaled = fed.affine(context.meters_per_unit**row.length_power, 0.0) if row.length_power else fed
+    if row.kind == "normal":
+        _check_encoding(context, path, row, fed)
     lookup: TextureLookup | None = scaled.to_lookup(context, path, _WIDTHS[row.kind])
     return row.default if lookup is None else lookup
+
+
+def _check_encoding(context: ReadContext, path, row: MaterialInput, fed: Expression) -> None:
+    """Name a normal map that cannot be meant as it is authored."""
+    if not fed.image.is_file:
+        return
+    if fed.image.is_8_bit and (fed.bias >= 0.0).all():
+        context.warn(
+            path,
+            f"{row.name} reads an 8-bit image as it is, which cannot point to all sides. Set scale (2, 2, 2, 1) and "
+            "bias (-1, -1, -1, 0) of its texture.",
+        )
+    if fed.image.is_decoded:
+        context.warn(
+            path, f"{row.name} reads an image that is decoded from sRGB. Set sourceColorSpace 'raw' of its texture."
+        )
 
 
 def to_constant(context: ReadContext, path, row: MaterialInput, value):
     """A constant in metres and in range; TypeError or ValueError where it is of another type."""
     if row.kind == "bool":
-        return bool(np.asarray(value).reshape(-1)[0])
+        number = np.asarray(value, np.float64).reshape(1)
+        if not np.isfinite(number).all():
+            raise ValueError(row.name)
+        return bool(number[0])
     if row.kind == "text":
         return str(value)
     if row.kind == "token":
@@ -114,7 +144,8 @@ def to_constant(context: ReadContext, path, row: MaterialInput, value):
     if (array < row.minimum).any() or (array > row.maximum).any():
         clamped = np.clip(array, row.minimum, row.maximum)
         unit = {1: " m", -1: " 1/m", 0: ""}[row.length_power]
-        context.warn(path, f"{row.name} must be {row.rule}{unit}, got {_text(array)}. {_text(clamped)} is used.")
+        got, used = number_text(array), number_text(clamped)
+        context.warn(path, f"{row.name} must be {row.rule}{unit}, got {got}. {used} is used.")
         array = clamped
     if row.kind == "float":
         return float(array[0])
@@ -125,7 +156,8 @@ def to_constant(context: ReadContext, path, row: MaterialInput, value):
     return tuple(array.tolist())
 
 
-def _text(array: np.ndarray) -> str:
+def number_text(array: np.ndarray) -> str:
+    """0.5, or (0.1, 0.2, 0.3)."""
     values = ", ".join(f"{value:g}" for value in array.reshape(-1))
     return values if array.size == 1 else f"({values})"
 

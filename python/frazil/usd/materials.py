@@ -18,11 +18,11 @@ from .material_inputs import (
     OVERLAY_INPUTS,
     PREVIEW_IGNORED,
     PREVIEW_INPUTS,
-    find_input,
     snake_case,
 )
-from .material_values import ShaderValues, texcoord_name, to_value
+from .material_values import ShaderValues, texcoord_name
 from .mtlx_library import DENSITY_NODE, ICE_NODE, OVERLAY_NODE, OVERLAY_SLOTS
+from .nearest_surface import any_surface_shader, larger_of_mix, read_nearest
 from .shading import ShaderReader
 from .surface_models import MODELS, SurfaceModelReader
 
@@ -33,29 +33,6 @@ PREVIEW_SHADERS = ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader")
 # The surface of the first of these that the material has is read.
 RENDER_CONTEXTS = ("frazil", "mtlx", "")
 _OVERLAY_PREFIX = "overlays:"
-
-# Inputs of shaders that Frazil does not know, and the input of UsdPreviewSurface that they come nearest to.
-_NEAREST_INPUTS = {
-    "diffuseColor": (
-        "diffuseColor",
-        "base_color",
-        "baseColor",
-        "diffuse_color",
-        "diffuse_reflection_color",
-        "basecolor",
-        "diffuse",
-        "Kd",
-        "color",
-        "albedo",
-        "tint",
-        "displayColor",
-    ),
-    "roughness": ("roughness", "specular_roughness", "specularRoughness", "reflection_roughness_constant"),
-    "metallic": ("metallic", "metalness", "metallic_constant"),
-    "ior": ("ior", "specular_IOR", "specular_ior", "IOR"),
-    "emissiveColor": ("emissiveColor", "emission_color", "emissive_color"),
-    "opacity": ("opacity", "alpha"),
-}
 
 
 @dataclass(frozen=True)
@@ -94,7 +71,7 @@ class MaterialReader:
                 model, primvar = read()
                 if material is not None:
                     displacement = read_displacement(self._shaders, material, RENDER_CONTEXTS)
-            except (ValueError, TypeError, Tf.ErrorException) as error:
+            except (ValueError, TypeError, IndexError, Tf.ErrorException) as error:
                 # A broken material must not lose the meshes that it is bound to.
                 self._context.warn(path, f"{' '.join(str(error).split())} displayColor is shown.")
                 model, primvar = StandardMaterial(uses_display_color=True), None
@@ -105,11 +82,21 @@ class MaterialReader:
         return self._known[path]
 
     def _warn_of_broken_binding(self, prim: Usd.Prim) -> None:
-        binding = UsdShade.MaterialBindingAPI(prim).GetDirectBinding()
-        path = binding.GetMaterialPath()
+        """Name what an unbound prim is bound to after all: nothing that is there, or a material for previews alone."""
+        preview, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("preview")
+        path, holder = None, prim
+        while holder and not path:  # its own binding, else the one it inherits
+            path = UsdShade.MaterialBindingAPI(holder).GetDirectBinding().GetMaterialPath()
+            holder = holder.GetParent()
         if path:
             self._context.warn(
                 prim.GetPath(), f"is bound to <{path}>, which is no material. Its displayColor is shown."
+            )
+        elif preview:
+            self._context.warn(
+                prim.GetPath(),
+                f"is bound to <{preview.GetPath()}> for the purpose 'preview' alone. Its displayColor is shown; bind a "
+                "material for 'full' or for all purposes.",
             )
 
     def _read(self, material: UsdShade.Material):
@@ -117,11 +104,14 @@ class MaterialReader:
         for render_context in RENDER_CONTEXTS:
             shader, _, _ = material.ComputeSurfaceSource(render_context)  # of this context, else the universal one
             if shader:
-                found.append(shader)
-        if not found:
-            return self._read_nearest(material, None)
+                found.append(larger_of_mix(self._shaders, shader))
         known = (*ICE_SHADERS, *PREVIEW_SHADERS, *MODELS)
-        shader = next((s for s in found if s.GetShaderId() in known), found[0])
+        shader = next((s for s in found if s.GetShaderId() in known), found[0] if found else None)
+        if shader is None:
+            shader = any_surface_shader(material)
+        if shader is None:
+            self._context.warn(material.GetPath(), "has no surface shader. displayColor is shown.")
+            return StandardMaterial(uses_display_color=True), None
         kind = shader.GetShaderId()
         if kind in ICE_SHADERS:
             return self._read_ice(shader)
@@ -129,7 +119,7 @@ class MaterialReader:
             return self._read_preview(shader)
         if kind in MODELS:
             return SurfaceModelReader(self._shaders, shader).read()
-        return self._read_nearest(material, shader)
+        return read_nearest(self._shaders, shader)
 
     # -- frazil:ice
 
@@ -255,48 +245,9 @@ class MaterialReader:
 
     def _read_preview(self, shader: UsdShade.Shader):
         read = ShaderValues(self._shaders, shader, PREVIEW_INPUTS, PREVIEW_IGNORED)
-        return self._standard(shader, read.values, read.expressions)
-
-    def _standard(self, shader: UsdShade.Shader, values: dict[str, object], expressions: dict[str, Expression]):
-        diffuse = expressions.get("diffuseColor")
+        diffuse = read.expressions.get("diffuseColor")
         model = StandardMaterial(
             uses_display_color=diffuse is not None and diffuse.is_display_color,
-            **{snake_case(name): value for name, value in values.items()},
+            **{snake_case(name): value for name, value in read.values.items()},
         )
-        return model, texcoord_name(self._context, shader.GetPath(), list(expressions.values()))
-
-    # -- anything else
-
-    def _read_nearest(self, material: UsdShade.Material, shader: UsdShade.Shader | None):
-        context = self._context
-        if shader is None:
-            shader = _any_surface_shader(material)
-        if shader is None:
-            context.warn(material.GetPath(), "has no surface shader. displayColor is shown.")
-            return StandardMaterial(uses_display_color=True), None
-        kind = shader.GetShaderId() or shader.GetPrim().GetTypeName() or "?"
-        context.warn(
-            shader.GetPath(),
-            f"the shader '{kind}' is not supported. Its nearest match in UsdPreviewSurface is rendered.",
-            once="shader",
-        )
-        values: dict[str, object] = {}
-        expressions: dict[str, Expression] = {}
-        for name, candidates in _NEAREST_INPUTS.items():
-            found = next((c for c in candidates if shader.GetInput(c)), None)
-            fed = self._shaders.read(shader, found) if found else None
-            if fed is not None:
-                expressions[name] = fed
-                values[name] = to_value(context, shader.GetPath(), find_input(PREVIEW_INPUTS, name), fed)
-        if "diffuseColor" not in expressions:
-            return StandardMaterial(uses_display_color=True), None
-        return self._standard(shader, values, expressions)
-
-
-def _any_surface_shader(material: UsdShade.Material) -> UsdShade.Shader | None:
-    """The surface shader of whatever render context there is."""
-    for output in material.GetSurfaceOutputs():
-        for attribute in UsdShade.Utils.GetValueProducingAttributes(output):
-            if UsdShade.Output.IsOutput(attribute):
-                return UsdShade.Shader(attribute.GetPrim())
-    return None
+        return model, texcoord_name(self._context, shader.GetPath(), list(read.expressions.values()))

@@ -8,12 +8,12 @@ Not: the document's geometry, property sets, variants, and visibility.
 
 from __future__ import annotations
 
-import os
+import math
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 import MaterialX as mx
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from .context import ReadContext
 from .mtlx_library import library
@@ -76,7 +76,7 @@ def to_layer(context: ReadContext, document: mx.Document, path: str, root: str =
         context.warn(path, f"MaterialX says: {' '.join(said.splitlines()[0].split())}")
     _flatten(document)
     for material in document.getMaterialNodes():
-        _Material(context, stage, path, f"/{root}/Materials/{material.getName()}").write(material)
+        _Material(context, stage, path, f"/{root}/Materials/{_identifier(material.getName())}").write(material)
     return layer
 
 
@@ -117,7 +117,9 @@ class _Material:
         if key in self._nodes:
             return self._nodes[key]
         definition = node.getNodeDef()
-        name = Sdf.Path(f"{self._material.GetPath()}/{key}")
+        name = self._material.GetPath()
+        for part in key.split("/"):
+            name = name.AppendChild(_identifier(part))
         parent = name.GetParentPath()
         while parent != self._material.GetPath():
             self._stage.DefinePrim(parent, "NodeGraph")
@@ -154,7 +156,7 @@ class _Material:
         if node_input.getType() in ("filename", "color3", "color4"):
             # What the file, its graph or the document says.
             space = holder.getActiveColorSpace()
-            if space and node_input.getType() == "filename":
+            if space:
                 attribute.SetColorSpace(space)
 
     def _holder(self, node_input: mx.Input) -> mx.Input | None:
@@ -182,7 +184,7 @@ class _Material:
                 break
             if not (holder.getNodeGraphString() or holder.getOutputString()):
                 return None
-            output = holder.getConnectedOutput()
+            output = holder.getConnectedOutput() or _qualified_output(holder)
             if output is None:
                 self._context.warn(
                     self._path, f"{holder.getNamePath()} is connected to an output that does not exist. It is left out."
@@ -205,14 +207,15 @@ class _Material:
         return shader.CreateOutput(holder.getOutputString() or "out", _VALUE_TYPES.Token)
 
     def _sibling(self, element: mx.Element, name: str) -> mx.Node | None:
-        graph = _graph_of(element) or element.getDocument()
-        return graph.getNode(name)
+        # The inputs of a graph are fed by what stands beside it.
+        inside = element.getParent().getParent() if isinstance(element.getParent(), mx.NodeGraph) else element
+        graph = _graph_of(inside if isinstance(element, mx.Input) else element) or element.getDocument()
+        return graph.getNode(name) or graph.getNode(element.getQualifiedName(name))
 
     def _value(self, holder: mx.Input):
         kind, text = holder.getType(), holder.getValueString()
         if kind == "filename":
-            name = holder.getActiveFilePrefix() + text
-            return Sdf.AssetPath(name if os.path.isabs(name) else str(self._folder / name))
+            return Sdf.AssetPath(self._find_file(holder, holder.getActiveFilePrefix() + text))
         if kind == "color3array":
             numbers = [float(number) for number in text.replace(",", " ").split()]
             return [Gf.Vec3f(*numbers[i : i + 3]) for i in range(0, len(numbers) - 2, 3)]
@@ -234,12 +237,43 @@ class _Material:
             return [float(v) * factor for v in value]
         return value
 
+    def _find_file(self, holder: mx.Input, name: str) -> str:
+        """Beside the document, else beside the one that it includes the input from."""
+        beside = self._folder / name
+        included = self._folder / Path(holder.getActiveSourceUri()).parent / name
+        return str(included if included != beside and not _is_there(beside) and _is_there(included) else beside)
+
     def _factor(self, holder: mx.Input) -> float:
-        """Scene units per authored unit of length."""
+        """Scene units per authored unit of length, degrees per authored unit of angle."""
         unit = holder.getUnit()
-        if not unit or holder.getUnitType() not in ("", "distance"):
+        if not unit or unit == "degree":
             return 1.0
-        return _METRES[unit] / self._context.meters_per_unit if unit in _METRES else 1.0
+        if unit == "radian":
+            return math.degrees(1.0)
+        if unit in _METRES:
+            return _METRES[unit] / self._context.meters_per_unit
+        name = holder.getNamePath()
+        self._context.warn(self._path, f"{name} has the unit '{unit}', which is not known. It is ignored.")
+        return 1.0
+
+
+def _identifier(name: str) -> str:
+    """A name of MaterialX's, which may have a namespace, as one of USD's: acme:Ice -> acme_Ice."""
+    return Tf.MakeValidIdentifier(name)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file; a pattern of tiles counts by its folder's files."""
+    return path.is_file() or ("<" in path.name and any(path.parent.glob(path.name.partition("<")[0] + "*")))
+
+
+def _qualified_output(holder: mx.Input) -> mx.Output | None:
+    """The output of a graph that is named without its namespace."""
+    document = holder.getDocument()
+    graph = document.getNodeGraph(holder.getQualifiedName(holder.getNodeGraphString()))
+    if graph is None:
+        return None
+    return graph.getOutput(holder.getOutputString()) if holder.getOutputString() else (graph.getOutputs() or [None])[0]
 
 
 def _graph_of(element: mx.Element) -> mx.NodeGraph | None:
@@ -306,6 +340,8 @@ def override_materials(context: ReadContext, path: str, look: str | None = None)
     context.layers.append(layer)
     stage = context.stage
     stage.GetSessionLayer().subLayerPaths.append(layer.identifier)
+    for variant in chosen.getActiveVariantAssigns():
+        context.warn(path, f"{variant.getNamePath()} chooses a variant, which is not supported. It is left out.")
     assigns = [(a, _Geometry(a)) for a in chosen.getActiveMaterialAssigns()]
     used: set[str] = set()
     with Usd.EditContext(stage, stage.GetSessionLayer()):
@@ -320,7 +356,7 @@ def override_materials(context: ReadContext, path: str, look: str | None = None)
             if prim.IsInstanceProxy():
                 context.warn(name, f"is inside an instance, so that {path} cannot change its material.")
                 continue
-            target = stage.GetPrimAtPath(f"/{_OVERRIDE_ROOT}/Materials/{fitting.getMaterial()}")
+            target = stage.GetPrimAtPath(f"/{_OVERRIDE_ROOT}/Materials/{_identifier(fitting.getMaterial())}")
             if not target:
                 context.warn(path, f"{fitting.getNamePath()} assigns '{fitting.getMaterial()}', which does not exist.")
                 continue
@@ -336,16 +372,23 @@ class _Geometry:
     """The prims that a material is assigned to: paths, with what lies below, and wildcards."""
 
     def __init__(self, assign: mx.MaterialAssign) -> None:
-        texts = [assign.getActiveGeomPrefix() + assign.getGeom()] if assign.getGeom() else []
-        collection = assign.getCollection()
-        self._excluded: list[str] = []
-        if collection is not None:
-            texts.append(collection.getIncludeGeom())
-            self._excluded = _split(collection.getExcludeGeom())
-        self._included = [name for text in texts for name in _split(text)]
+        self._named = [assign.getActiveGeomPrefix() + name for name in _split(assign.getGeom())]
+        self._collection = assign.getCollection()
 
     def has(self, path: str) -> bool:
-        return _fits(self._included, path) and not _fits(self._excluded, path)
+        return _fits(self._named, path) or _is_in(self._collection, path, set())
+
+
+def _is_in(collection: mx.Collection | None, path: str, seen: set[str]) -> bool:
+    """Whether a collection, or one that it includes, has the path; none is looked into twice."""
+    if collection is None or collection.getName() in seen:
+        return False
+    seen.add(collection.getName())
+    is_included = _fits(_split(collection.getIncludeGeom()), path) or any(
+        _is_in(collection.getDocument().getCollection(name), path, seen)
+        for name in _split(collection.getIncludeCollectionString())
+    )
+    return is_included and not _fits(_split(collection.getExcludeGeom()), path)
 
 
 def _split(text: str) -> list[str]:

@@ -8,19 +8,20 @@ input that they feed keeps its default.
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Callable
 
 import MaterialX as mx
 import numpy as np
 from pxr import Sdf
 
+from . import mtlx_normals
 from .expression import Expression, bake, combine, image_expression
+from .mtlx_arithmetic import EXACT, POINTWISE, UnsupportedNodeError, input_of, number_of, to_python, value_of
 from .mtlx_library import library
 
 _WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "black"}
-_SOBEL_SCALE = 1.0 / 16.0  # of MaterialX's heighttonormal
-_LUMA = np.array([0.2126, 0.7152, 0.0722])
+_WIDTHS = {"float": 1, "vector2": 2, "color3": 3, "vector3": 3, "color4": 4, "vector4": 4}
 
 
 class NodeReader:
@@ -29,6 +30,11 @@ class NodeReader:
     path: str
     id: str
     kind: str
+
+    @functools.cached_property
+    def definition(self) -> mx.NodeDef | None:
+        """What MaterialX's library says of such a node; None where it has none."""
+        return library().getNodeDef(self.id) if self.id else None
 
     def value(self, name: str):
         """A constant input, or None."""
@@ -58,204 +64,78 @@ def node_kind(identifier: str) -> str:
     return match[1] if match else identifier
 
 
-def _default(node: NodeReader, name: str):
-    """The value that the node's definition gives an input; None where it has none."""
-    definition = library().getNodeDef(node.id)
-    found = definition.getActiveInput(name) if definition is not None else None
-    return _to_python(found.getValue()) if found is not None and found.getValueString() else None
-
-
-def _to_python(value):
-    return value.asTuple() if hasattr(value, "asTuple") else value
-
-
-def _input(node: NodeReader, name: str, default=0.0) -> Expression:
-    fed = node.input(name)
-    if fed is not None:
-        return fed
-    known = _default(node, name)
-    return Expression.constant(default if known is None else known)
-
-
-def _value(node: NodeReader, name: str, default):
-    value = node.value(name)
-    if value is None:
-        value = _default(node, name)
-    return default if value is None else value
-
-
-# Functions of one to four inputs, by name and default: numpy arrays whose last axis has the numbers.
-_POINTWISE: dict[str, tuple[tuple[tuple[str, float], ...], Callable[..., np.ndarray]]] = {
-    "clamp": ((("in", 0), ("low", 0), ("high", 1)), lambda x, low, high: np.minimum(np.maximum(x, low), high)),
-    "min": ((("in1", 0), ("in2", 0)), np.minimum),
-    "max": ((("in1", 0), ("in2", 0)), np.maximum),
-    "power": ((("in1", 0), ("in2", 1)), lambda x, y: np.power(np.maximum(x, 0), y)),
-    "modulo": ((("in1", 0), ("in2", 1)), np.mod),
-    "absval": ((("in", 0),), np.abs),
-    "sign": ((("in", 0),), np.sign),
-    "floor": ((("in", 0),), np.floor),
-    "ceil": ((("in", 0),), np.ceil),
-    "round": ((("in", 0),), lambda x: np.floor(x + 0.5)),
-    "sqrt": ((("in", 0),), lambda x: np.sqrt(np.maximum(x, 0))),
-    "exp": ((("in", 0),), np.exp),
-    "ln": ((("in", 1),), lambda x: np.log(np.maximum(x, 1e-30))),
-    "sin": ((("in", 0),), np.sin),
-    "cos": ((("in", 0),), np.cos),
-    "smoothstep": (
-        (("in", 0), ("low", 0), ("high", 1)),
-        lambda x, low, high: _smooth(np.clip((x - low) / np.where(high == low, 1e-9, high - low), 0, 1)),
-    ),
-    "dotproduct": ((("in1", 0), ("in2", 0)), lambda x, y: np.sum(x * y, axis=-1, keepdims=True)),
-    "magnitude": ((("in", 0),), lambda x: np.linalg.norm(x, axis=-1, keepdims=True)),
-    "normalize": ((("in", 0),), lambda x: x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-20)),
-    "luminance": ((("in", 0),), lambda x: np.repeat(np.sum(x[..., :3] * _LUMA, axis=-1, keepdims=True), 3, axis=-1)),
-    "ifgreater": (
-        (("value1", 1), ("value2", 0), ("in1", 0), ("in2", 0)),
-        lambda a, b, x, y: np.where(a > b, x, y),
-    ),
-    "ifgreatereq": (
-        (("value1", 1), ("value2", 0), ("in1", 0), ("in2", 0)),
-        lambda a, b, x, y: np.where(a >= b, x, y),
-    ),
-    "ifequal": ((("value1", 0), ("value2", 0), ("in1", 0), ("in2", 0)), lambda a, b, x, y: np.where(a == b, x, y)),
-}
-
-
-def _smooth(t: np.ndarray) -> np.ndarray:
-    return t * t * (3.0 - 2.0 * t)
-
-
 def evaluate_node(reader, node: NodeReader, output: str) -> Expression | None:
     """One output of a MaterialX node; None, after a warning, where it is not supported."""
-    kind = node.kind
-    if kind in _POINTWISE:
-        inputs, function = _POINTWISE[kind]
-        return bake([_input(node, n, d) for n, d in inputs], function, kind, reader.context, node.path)
-    special = _SPECIAL.get(kind)
-    if special is not None:
-        return special(reader, node, output)
-    graph = _defining_graph(node.id)
-    if graph is not None:
-        return _evaluate_graph(reader, node, graph, output)
-    reader.context.warn(node.path, f"is a '{node.id or kind}' node, which is not supported. The default is used.")
+    try:
+        return _evaluate(reader, node, output)
+    except UnsupportedNodeError:
+        message = f"is a '{node.id or node.kind}' node, which is not supported."
+    except (ValueError, TypeError, IndexError, ArithmeticError) as error:
+        message = f"is a '{node.id or node.kind}' node that cannot be worked out: {' '.join(str(error).split())}."
+    reader.context.warn(node.path, f"{message} The default is used.")
     return None
 
 
-# -- arithmetic that stays exact with constants
-
-
-def _is_number(value: Expression) -> bool:
-    return value.image is None and not value.is_display_color
-
-
-def _add(reader, node, output, sign=1.0):
-    a, b = _input(node, "in1"), _input(node, "in2")
-    if _is_number(b):
-        return a.affine(1.0, sign * b.bias)
-    if _is_number(a):
-        return b.affine(sign, a.bias)
-    return bake([a, b], lambda x, y: x + sign * y, node.kind, reader.context, node.path)
-
-
-def _multiply(reader, node, output):
-    a, b = _input(node, "in1"), _input(node, "in2", 1.0)
-    if _is_number(b):
-        return a.affine(b.bias, 0.0)
-    if _is_number(a):
-        return b.affine(a.bias, 0.0)
-    return bake([a, b], np.multiply, node.kind, reader.context, node.path)
-
-
-def _divide(reader, node, output):
-    a, b = _input(node, "in1"), _input(node, "in2", 1.0)
-    if _is_number(b):
-        return a.affine(1.0 / np.where(b.bias == 0, 1.0, b.bias), 0.0)
-    return bake([a, b], lambda x, y: x / np.where(y == 0, 1.0, y), node.kind, reader.context, node.path)
-
-
-def _invert(reader, node, output):
-    amount, value = _input(node, "amount", 1.0), _input(node, "in")
-    if _is_number(amount):
-        return value.affine(-1.0, amount.bias)
-    return bake([amount, value], np.subtract, node.kind, reader.context, node.path)
-
-
-def _mix(reader, node, output):
-    front, back, share = _input(node, "fg"), _input(node, "bg"), _input(node, "mix")
-    if _is_number(share):
-        if _is_number(back):
-            return front.affine(share.bias, back.bias * (1.0 - share.bias))
-        if _is_number(front):
-            return back.affine(1.0 - share.bias, front.bias * share.bias)
-    elif _is_number(front) and _is_number(back):
-        return share.affine(front.bias - back.bias, back.bias)
-    return bake([front, back, share], lambda f, b, m: f * m + b * (1.0 - m), node.kind, reader.context, node.path)
-
-
-def _remap(reader, node, output):
-    value = _input(node, "in")
-    low, high, to_low, to_high = (_input(node, n) for n in ("inlow", "inhigh", "outlow", "outhigh"))
-    if all(map(_is_number, (low, high, to_low, to_high))):
-        span = high.bias - low.bias
-        scale = (to_high.bias - to_low.bias) / np.where(span == 0, 1.0, span)
-        return value.affine(scale, to_low.bias - low.bias * scale)
-    return bake(
-        [value, low, high, to_low, to_high],
-        lambda x, a, b, c, d: c + (x - a) / np.where(b == a, 1.0, b - a) * (d - c),
-        node.kind,
-        reader.context,
-        node.path,
-    )
+def _evaluate(reader, node: NodeReader, output: str) -> Expression | None:
+    kind = node.kind
+    if kind in POINTWISE:
+        inputs, function = POINTWISE[kind]
+        return bake([input_of(node, n, d) for n, d in inputs], function, kind, reader.context, node.path)
+    special = EXACT.get(kind) or _SPECIAL.get(kind)
+    if special is not None:
+        return special(reader, node, output)
+    graph = _defining_graph(node.definition)
+    if graph is None:
+        raise UnsupportedNodeError(node.id)
+    return _evaluate_graph(reader, node, graph, output)
 
 
 # -- parts
 
 
 def _constant(reader, node, output):
-    return _input(node, "value")
+    return input_of(node, "value")
 
 
 def _pass_on(reader, node, output):
-    return _input(node, "in")
+    return input_of(node, "in")
 
 
 def _convert(reader, node, output):
-    value = _input(node, "in")
-    definition = library().getNodeDef(node.id)
-    width = {"float": 1, "vector2": 2, "color3": 3, "vector3": 3, "color4": 4, "vector4": 4}.get(
-        definition.getType() if definition is not None else "", value.width
-    )
+    value = input_of(node, "in")
+    width = _WIDTHS.get(node.definition.getType() if node.definition is not None else "", value.width)
     if value.width == 1:
         return value.widened(width)
     if value.width >= width:
         return value.component(*range(width))
-    one = Expression.constant(1.0)
-    return combine([value.component(i) if i < value.width else one for i in range(width)], reader.context, node.path)
+    # A third number is 0, a fourth (alpha) 1.
+    parts = [value.component(i) if i < value.width else Expression.constant(float(i == 3)) for i in range(width)]
+    return combine(parts, reader.context, node.path)
 
 
 def _combine(reader, node, output):
     count = int(node.kind[-1])
     parts: list[Expression] = []
     for i in range(count):
-        part = _input(node, f"in{i + 1}")
+        part = input_of(node, f"in{i + 1}")
         parts += [part.component(k) for k in range(part.width)]
     return combine(parts, reader.context, node.path)
 
 
 def _separate(reader, node, output):
     at = {"outr": 0, "outg": 1, "outb": 2, "outa": 3, "outx": 0, "outy": 1, "outz": 2, "outw": 3}.get(output, 0)
-    value = _input(node, "in")
+    value = input_of(node, "in")
     return value.component(min(at, value.width - 1))
 
 
 def _extract(reader, node, output):
-    value = _input(node, "in")
-    return value.component(min(int(_value(node, "index", 0)), value.width - 1))
+    value = input_of(node, "in")
+    return value.component(min(max(int(number_of(node, "index", 0)), 0), value.width - 1))
 
 
 def _swizzle(reader, node, output):
-    value = _input(node, "in")
-    letters = str(_value(node, "channels", "r"))
+    value = input_of(node, "in")
+    letters = str(value_of(node, "channels", "r"))
     parts = [
         Expression.constant(float(c)) if c in "01" else value.component(min("rgbaxyzw".index(c) % 4, value.width - 1))
         for c in letters
@@ -265,16 +145,16 @@ def _swizzle(reader, node, output):
 
 
 def _switch(reader, node, output):
-    number = int(float(np.asarray(_value(node, "which", 0)).reshape(-1)[0]))
-    return _input(node, f"in{min(max(number, 0), 9) + 1}")
+    number = int(number_of(node, "which", 0))
+    return input_of(node, f"in{number + 1}") if 0 <= number <= 9 else Expression.constant(np.zeros(_width_of(node)))
 
 
 def _geompropvalue(reader, node, output):
-    if _value(node, "geomprop", "") in ("displayColor", "Cd"):
+    if value_of(node, "geomprop", "") in ("displayColor", "Cd"):
         return Expression(np.zeros(3), is_display_color=True)
     reader.context.warn(
         node.path,
-        f"reads the geomprop '{_value(node, 'geomprop', '')}', which is not supported. Its default is used.",
+        f"reads the geomprop '{value_of(node, 'geomprop', '')}', which is not supported. Its default is used.",
     )
     return node.input("default")
 
@@ -283,21 +163,19 @@ def _geompropvalue(reader, node, output):
 
 
 def _width_of(node: NodeReader) -> int:
-    definition = library().getNodeDef(node.id)
-    kind = definition.getType() if definition is not None else "color3"
-    return {"float": 1, "vector2": 2, "color3": 3, "vector3": 3, "color4": 4, "vector4": 4}.get(kind, 3)
+    return _WIDTHS.get(node.definition.getType() if node.definition is not None else "color3", 3)
 
 
 def _image(reader, node, output):
     width = _width_of(node)
-    fallback = np.resize(np.asarray(_value(node, "default", 0.0), np.float64).reshape(-1), width)
-    wraps = tuple(_WRAPS.get(str(_value(node, n, "periodic")), "repeat") for n in ("uaddressmode", "vaddressmode"))
+    fallback = np.resize(np.asarray(value_of(node, "default", 0.0), np.float64).reshape(-1), width)
+    wraps = tuple(_WRAPS.get(str(value_of(node, n, "periodic")), "repeat") for n in ("uaddressmode", "vaddressmode"))
     placement = reader.placement(node, "texcoord", wraps)
     if node.kind == "tiledimage":
-        tiling = np.resize(np.asarray(_value(node, "uvtiling", 1.0), np.float64), 2)
-        shift = np.resize(np.asarray(_value(node, "uvoffset", 0.0), np.float64), 2)
-        size = np.resize(np.asarray(_value(node, "realworldimagesize", 1.0), np.float64), 2)
-        tile = np.resize(np.asarray(_value(node, "realworldtilesize", 1.0), np.float64), 2)
+        tiling = np.resize(np.asarray(value_of(node, "uvtiling", 1.0), np.float64), 2)
+        shift = np.resize(np.asarray(value_of(node, "uvoffset", 0.0), np.float64), 2)
+        size = np.resize(np.asarray(value_of(node, "realworldimagesize", 1.0), np.float64), 2)
+        tile = np.resize(np.asarray(value_of(node, "realworldtilesize", 1.0), np.float64), 2)
         factor = tile / np.where(size == 0, 1.0, size)
         matrix = np.reshape(placement.matrix, (2, 2)) @ np.diag(tiling * factor)
         offset = (np.array(placement.offset) * tiling - shift) * factor
@@ -309,7 +187,7 @@ def _image(reader, node, output):
 
 def _triplanar(reader, node, output):
     width = _width_of(node)
-    fallback = np.resize(np.asarray(_value(node, "default", 0.0), np.float64).reshape(-1), width)
+    fallback = np.resize(np.asarray(value_of(node, "default", 0.0), np.float64).reshape(-1), width)
     files = [node.file(n)[0] for n in ("filex", "filey", "filez")]
     if len({f.path for f in files if f is not None}) > 1:
         reader.context.warn(node.path, "projects several images, which is not supported. 'filex' is used for all.")
@@ -336,63 +214,14 @@ def _open(reader, node, name, width, fallback, placement):
     return image_expression(image, list(range(width)), np.ones(width), np.zeros(width), placement)
 
 
-# -- normals: in tangent space, z along the surface's own
-
-
-def _normalmap(reader, node, output):
-    value = _input(node, "in", (0.5, 0.5, 1.0)).widened(3)
-    space = str(_value(node, "space", "tangent"))
-    if space != "tangent":
-        reader.context.warn(node.path, f"normal maps must be in tangent space, got '{space}'. It is left out.")
-        return None
-    strength = np.resize(np.asarray(_value(node, "scale", 1.0), np.float64), 2)
-    factors = np.array([strength[0], strength[1], 1.0])
-    return value.affine(2.0 * factors, -1.0 * factors)
-
-
-def _height_to_normal(value: Expression, scale: float, reader, node) -> Expression:
-    """Encoded normals of a height image, as MaterialX's heighttonormal has them: slopes over st, times scale / 16."""
-
-    def normals(height: np.ndarray) -> np.ndarray:
-        h = height[..., 0]
-        if min(h.shape) < 2:
-            n = np.zeros((*h.shape, 3))
-            n[..., 2] = 1.0
-        else:
-            by_t, by_s = np.gradient(h)
-            slope_s, slope_t = by_s * h.shape[1], -by_t * h.shape[0]
-            n = np.stack([-slope_s * scale * _SOBEL_SCALE, -slope_t * scale * _SOBEL_SCALE, np.ones_like(h)], axis=-1)
-        return n / np.linalg.norm(n, axis=-1, keepdims=True) * 0.5 + 0.5
-
-    if value.image is None:
-        return Expression.constant((0.5, 0.5, 1.0))
-    return bake([value.component(0)], normals, f"heighttonormal {scale}", reader.context, node.path)
-
-
-def _heighttonormal(reader, node, output):
-    scale = float(np.asarray(_value(node, "scale", 1.0)).reshape(-1)[0])
-    return _height_to_normal(_input(node, "in"), scale, reader, node)
-
-
-def _bump(reader, node, output):
-    scale = float(np.asarray(_value(node, "scale", 1.0)).reshape(-1)[0])
-    return _height_to_normal(_input(node, "height"), scale, reader, node).affine(2.0, -1.0)
-
-
-def _no_normal(reader, node, output):
+def _own_normal(reader, node, output):
+    """The surface's own normal, which is what an input has that nothing feeds."""
     return None
 
 
 _SPECIAL = {
     "constant": _constant,
     "dot": _pass_on,
-    "add": _add,
-    "subtract": lambda reader, node, output: _add(reader, node, output, -1.0),
-    "multiply": _multiply,
-    "divide": _divide,
-    "invert": _invert,
-    "mix": _mix,
-    "remap": _remap,
     "convert": _convert,
     "combine2": _combine,
     "combine3": _combine,
@@ -407,18 +236,17 @@ _SPECIAL = {
     "image": _image,
     "tiledimage": _image,
     "triplanarprojection": _triplanar,
-    "normalmap": _normalmap,
-    "heighttonormal": _heighttonormal,
-    "bump": _bump,
-    "normal": _no_normal,
+    "normalmap": mtlx_normals.normalmap,
+    "heighttonormal": mtlx_normals.heighttonormal,
+    "bump": mtlx_normals.bump,
+    "normal": _own_normal,
 }
 
 
 # -- nodes that are graphs
 
 
-def _defining_graph(identifier: str) -> mx.NodeGraph | None:
-    definition = library().getNodeDef(identifier) if identifier else None
+def _defining_graph(definition: mx.NodeDef | None) -> mx.NodeGraph | None:
     if definition is None or definition.getType() in ("surfaceshader", "displacementshader", "material"):
         return None
     found = definition.getImplementation()
@@ -443,22 +271,28 @@ class _GraphNode(NodeReader):
         if found is None:
             return None
         if found.getInterfaceName():
-            return _value(self._outer, found.getInterfaceName(), None)
+            return value_of(self._outer, found.getInterfaceName(), None)
         if found.getNodeName():
+            node, _ = self.upstream(name)
+            if node.kind == "constant":  # matrices too
+                return node.value("value")
             fed = self.input(name)
             return fed.bias if fed is not None and fed.image is None else None
-        return _to_python(found.getValue())
+        return to_python(found.getValue())
 
     def input(self, name: str) -> Expression | None:
         found = self._find(name)
         if found is None:
             return None
         if found.getInterfaceName():
-            return _input(self._outer, found.getInterfaceName())
+            return input_of(self._outer, found.getInterfaceName())
         if found.getNodeName():
             node, output = self.upstream(name)
-            return evaluate_node(self._reader, node, output)
-        value = _to_python(found.getValue())
+            value = _evaluate(self._reader, node, output)
+            if value is None and node.kind != "normal":
+                raise UnsupportedNodeError(node.id)
+            return value
+        value = to_python(found.getValue())
         return None if value is None or isinstance(value, str) else Expression.constant(value)
 
     def upstream(self, name: str):
@@ -484,5 +318,4 @@ def _evaluate_graph(reader, node: NodeReader, graph: mx.NodeGraph, output: str) 
     inner = found.getConnectedNode() if found is not None else None
     if inner is None:
         return None
-    value = evaluate_node(reader, _GraphNode(reader, node, inner), found.getOutputString() or "out")
-    return value
+    return _evaluate(reader, _GraphNode(reader, node, inner), found.getOutputString() or "out")

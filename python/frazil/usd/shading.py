@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pxr import Sdf, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from .context import ReadContext
 from .expression import Expression, Placement, image_expression
+from .mtlx_arithmetic import number_of, value_of
 from .mtlx_nodes import NodeReader, evaluate_node, node_kind
-from .textures import Image, open_image
+from .textures import Image, open_image, to_linear
 
 _OUTPUT_CHANNELS = {"r": (0,), "g": (1,), "b": (2,), "a": (3,), "rgb": (0, 1, 2), "rgba": (0, 1, 2, 3)}
 _USD_WRAPS = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror", "black": "black", "useMetadata": "black"}
@@ -70,7 +71,15 @@ class ShaderReader:
                 f"reads the primvar '{node.value('varname') or ''}', which is not supported. Its fallback is used.",
             )
             return node.input("fallback")
+        if node.definition is not None:
+            self._warn_of_unknown_inputs(node)
         return evaluate_node(self, node, output)
+
+    def _warn_of_unknown_inputs(self, node: UsdNode) -> None:
+        names = [i.GetBaseName() for i in node.shader.GetInputs() if i.GetValueProducingAttributes()]
+        unknown = [n for n in names if node.definition.getActiveInput(n) is None]
+        if unknown:
+            self.context.warn(node.path, f"is a '{node.id}' node, which has no input {', '.join(unknown)}.")
 
     def _read_uv_texture(self, node: UsdNode, output: str) -> Expression | None:
         scale = np.resize(np.asarray(_or(node.value("scale"), (1, 1, 1, 1)), np.float64), 4)
@@ -124,12 +133,21 @@ class ShaderReader:
             elif kind == "texcoord":
                 number = int(step.value("index") or 0)
                 primvar = "st" if number == 0 else f"st{number}"
-            elif (move := _coordinate_step(step)) is not None:
-                matrix, offset = matrix @ move[0], offset @ move[0] + move[1]
             else:
-                self.context.warn(
-                    step.path, f"is a '{kind}' node for texture coordinates, which is not supported. It is left out."
-                )
+                try:
+                    move = _coordinate_step(step)
+                except (ValueError, TypeError) as error:
+                    self.context.warn(
+                        step.path, f"{' '.join(str(error).split())} in texture coordinates. It is left out."
+                    )
+                    continue
+                if move is None:
+                    self.context.warn(
+                        step.path,
+                        f"is a '{kind}' node for texture coordinates, which is not supported. It is left out.",
+                    )
+                    continue
+                matrix, offset = matrix @ move[0], offset @ move[0] + move[1]
         if primvar in ("UV0", "UV1"):
             primvar = "st" if primvar == "UV0" else "st1"
         return Placement(primvar, tuple(matrix.reshape(4).tolist()), tuple(offset.tolist()), wraps)
@@ -149,23 +167,23 @@ def _turn(degrees: float) -> np.ndarray:
 
 
 def _coordinate_step(node) -> tuple[np.ndarray, np.ndarray] | None:
-    """What a node does to coordinates: st @ matrix + offset."""
+    """What a node does to coordinates: st @ matrix + offset. ValueError where an image moves them."""
 
     def pair(name: str, default: float) -> np.ndarray:
-        return np.resize(np.asarray(_or(node.value(name), default), np.float64), 2)
+        return np.resize(np.asarray(value_of(node, name, default), np.float64), 2)
 
     kind = node.kind
     if kind == "UsdTransform2d":
-        turn = _turn(float(_or(node.value("rotation"), 0.0)))
+        turn = _turn(number_of(node, "rotation", 0.0))
         return np.diag(pair("scale", 1.0)) @ turn, pair("translation", 0.0)
     if kind == "place2d":
         pivot, shrink, move = pair("pivot", 0.0), np.diag(1.0 / _nonzero(pair("scale", 1.0))), pair("offset", 0.0)
-        turn = _turn(-float(_or(node.value("rotate"), 0.0)))
-        if int(_or(node.value("operationorder"), 0)) == 0:
+        turn = _turn(-number_of(node, "rotate", 0.0))
+        if int(number_of(node, "operationorder", 0)) == 0:
             return shrink @ turn, -pivot @ shrink @ turn - move + pivot
         return turn @ shrink, (-pivot - move) @ turn @ shrink + pivot
     if kind == "rotate2d":
-        return _turn(-float(_or(node.value("amount"), 0.0))), np.zeros(2)
+        return _turn(-number_of(node, "amount", 0.0)), np.zeros(2)
     other = "in1" if node.upstream("in2") and not node.upstream("in1") else "in2"
     if kind == "multiply":
         return np.diag(pair(other, 1.0)), np.zeros(2)
@@ -196,25 +214,58 @@ class UsdNode(NodeReader):
 
     def _sources(self, name: str):
         shader_input = self.shader.GetInput(name)
-        return shader_input.GetValueProducingAttributes() if shader_input else []
+        if not shader_input:
+            return []
+        found = shader_input.GetValueProducingAttributes()
+        if shader_input.HasConnectedSource() or shader_input.GetAttr().HasAuthoredConnections():
+            self._warn_of_dangling(shader_input, found)
+        return found
+
+    def _warn_of_dangling(self, shader_input: UsdShade.Input, found) -> None:
+        """Name a connection that leads to nothing, and what takes its place."""
+        if any(UsdShade.Output.IsOutput(a) or a.HasAuthoredValue() for a in found if a != shader_input.GetAttr()):
+            return
+        targets = ", ".join(f"<{path}>" for path in shader_input.GetAttr().GetConnections())
+        rest = "Its own value" if shader_input.GetAttr().HasAuthoredValue() else "The default"
+        self._reader.context.warn(
+            self.path, f"{shader_input.GetBaseName()} is connected to {targets}, which gives no value. {rest} is used."
+        )
+
+    def _constant(self, attribute: Usd.Attribute):
+        """A value at the frame; colours of another colour space as linear Rec.709."""
+        value = self._reader.context.get(attribute)
+        space = attribute.GetColorSpace() if attribute.HasColorSpace() else ""
+        if not space or value is None or attribute.GetTypeName().role != "Color":
+            return value
+        color = np.asarray(value, np.float32).reshape(1, -1)
+        if color.shape[1] not in (3, 4):
+            return value
+        try:
+            return to_linear(color[None], space, False).reshape(-1)
+        except ValueError as error:
+            self._reader.context.warn(attribute.GetPath(), f"{error} Its value is taken as linear.")
+            return value
 
     def value(self, name: str):
         """A constant (through material interfaces), as USD has it; one that constant nodes feed, as an array."""
         for attribute in self._sources(name):
             if not UsdShade.Output.IsOutput(attribute):
-                return self._reader.context.get(attribute)
+                return self._constant(attribute)
             fed = self.input(name)
             return fed.bias if fed is not None and fed.image is None else None
         return None
 
     def input(self, name: str) -> Expression | None:
-        """What feeds an input."""
+        """What feeds an input; None where that is nothing, or no number."""
         for attribute in self._sources(name):
             if UsdShade.Output.IsOutput(attribute):
                 node = UsdNode(self._reader, UsdShade.Shader(attribute.GetPrim()))
                 return self._reader.evaluate(node, UsdShade.Output(attribute).GetBaseName())
-            value = self._reader.context.get(attribute)
-            return None if value is None or isinstance(value, str) else Expression.constant(value)
+            value = self._constant(attribute)
+            try:
+                return None if value is None or isinstance(value, str) else Expression.constant(value)
+            except (ValueError, TypeError):
+                return None
         return None
 
     def upstream(self, name: str):

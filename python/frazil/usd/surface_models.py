@@ -9,6 +9,7 @@ Not: the inputs of NOT_CARRIED, which are named in one warning where they are au
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from .._frazil import IceMaterial, Medium, Overlay, StandardMaterial
 from .context import ReadContext
 from .expression import Expression, bake
 from .material_inputs import ICE_INPUTS, PREVIEW_INPUTS, MaterialInput, find_input
-from .material_values import ior_of_f0, is_close, texcoord_name, to_value
+from .material_values import ior_of_f0, is_close, number_text, texcoord_name, to_value
 from .mtlx_library import library
 from .shading import ShaderReader
 
@@ -55,8 +56,9 @@ class SurfaceModel:
     emission_color: str
     opacity: str
     normal: str
-    # Never carried over, and what that leaves out.
-    not_carried: tuple[tuple[str, str], ...]
+    coat_normal: str
+    # Never carried over; what that leaves out; and the input without which it does not matter ('' = it always does).
+    not_carried: tuple[tuple[str, str, str], ...]
 
     @property
     def carried(self) -> set[str]:
@@ -90,18 +92,20 @@ STANDARD_SURFACE = SurfaceModel(
     emission_color="emission_color",
     opacity="opacity",
     normal="normal",
+    coat_normal="coat_normal",
     not_carried=(
-        ("diffuse_roughness", "Oren-Nayar diffuse"),
-        ("specular_anisotropy, specular_rotation, tangent", "anisotropic reflection"),
-        ("transmission_dispersion", "dispersion"),
-        ("sheen, sheen_color, sheen_roughness", "sheen"),
+        ("diffuse_roughness", "Oren-Nayar diffuse", ""),
+        ("specular_anisotropy, specular_rotation, tangent", "anisotropic reflection", "specular_anisotropy"),
+        ("transmission_dispersion", "dispersion", "transmission"),
+        ("sheen, sheen_color, sheen_roughness", "sheen", "sheen"),
         (
-            "coat_color, coat_IOR, coat_anisotropy, coat_rotation, coat_normal",
+            "coat_color, coat_IOR, coat_anisotropy, coat_rotation",
             "a coat other than clear at the base's IOR",
+            "coat",
         ),
-        ("coat_affect_color, coat_affect_roughness", "what the coat does to the base below"),
-        ("thin_film_thickness, thin_film_IOR", "thin film"),
-        ("thin_walled", "thin walls: bodies are solid"),
+        ("coat_affect_color, coat_affect_roughness", "what the coat does to the base below", "coat"),
+        ("thin_film_thickness, thin_film_IOR", "thin film", "thin_film_thickness"),
+        ("thin_walled", "thin walls: bodies are solid", ""),
     ),
 )
 
@@ -131,18 +135,23 @@ OPEN_PBR_SURFACE = SurfaceModel(
     emission_color="emission_color",
     opacity="geometry_opacity",
     normal="geometry_normal",
+    coat_normal="geometry_coat_normal",
     not_carried=(
-        ("base_diffuse_roughness", "Oren-Nayar diffuse"),
-        ("specular_roughness_anisotropy, geometry_tangent", "anisotropic reflection"),
-        ("transmission_dispersion_scale, transmission_dispersion_abbe_number", "dispersion"),
-        ("fuzz_weight, fuzz_color, fuzz_roughness", "fuzz"),
+        ("base_diffuse_roughness", "Oren-Nayar diffuse", ""),
+        ("specular_roughness_anisotropy, geometry_tangent", "anisotropic reflection", "specular_roughness_anisotropy"),
         (
-            "coat_color, coat_ior, coat_darkening, coat_roughness_anisotropy, geometry_coat_normal, "
-            "geometry_coat_tangent",
-            "a coat other than clear at the base's IOR",
+            "transmission_dispersion_scale, transmission_dispersion_abbe_number",
+            "dispersion",
+            "transmission_dispersion_scale",
         ),
-        ("thin_film_weight, thin_film_thickness, thin_film_ior", "thin film"),
-        ("geometry_thin_walled", "thin walls: bodies are solid"),
+        ("fuzz_weight, fuzz_color, fuzz_roughness", "fuzz", "fuzz_weight"),
+        (
+            "coat_color, coat_ior, coat_darkening, coat_roughness_anisotropy, geometry_coat_tangent",
+            "a coat other than clear at the base's IOR",
+            "coat_weight",
+        ),
+        ("thin_film_weight, thin_film_thickness, thin_film_ior", "thin film", "thin_film_weight"),
+        ("geometry_thin_walled", "thin walls: bodies are solid", ""),
     ),
 )
 
@@ -150,14 +159,18 @@ MODELS = {
     "ND_standard_surface_surfaceshader": STANDARD_SURFACE,
     "ND_standard_surface_surfaceshader_100": STANDARD_SURFACE,
     "ND_open_pbr_surface_surfaceshader": OPEN_PBR_SURFACE,
+    "arnold:standard_surface": STANDARD_SURFACE,
+    "standard_surface": STANDARD_SURFACE,
 }
+# What has a largest value in a definition and may be larger all the same.
+_UNBOUNDED = ("emission_color", "transmission_scatter")
 
 
 def not_carried_markdown() -> str:
     """The table of what is left out as docs/material.md shows it."""
     lines = ["| left out | standard_surface | open_pbr_surface |", "|---|---|---|"]
-    other = {meaning: names for names, meaning in OPEN_PBR_SURFACE.not_carried}
-    for names, meaning in STANDARD_SURFACE.not_carried:
+    other = {meaning: names for names, meaning, _ in OPEN_PBR_SURFACE.not_carried}
+    for names, meaning, _ in STANDARD_SURFACE.not_carried:
         lines.append(f"| {meaning} | {_code(names)} | {_code(other.pop(meaning, ''))} |")
     lines += [f"| {meaning} | | {_code(names)} |" for meaning, names in other.items()]
     return "\n".join(lines)
@@ -175,19 +188,18 @@ class SurfaceModelReader:
         self._context: ReadContext = reader.context
         self._path = shader.GetPath()
         self._model = MODELS[shader.GetShaderId()]
-        self._definition = library().getNodeDef(shader.GetShaderId())
+        self._definition = library().getNodeDef(self._model.node)
         self._read: list[Expression] = []
+        self._fed: dict[str, Expression] = {}
 
     def read(self):
         """The material, and the primvar of its images."""
+        self._warn_of_unknown_inputs()
         self._lost: list[str] = []
-        for names, _ in self._model.not_carried:
-            self._lost += [n.strip() for n in names.split(",") if self._is_changed(n.strip())]
-        for shader_input in self._shader.GetInputs():
-            name = shader_input.GetBaseName()
-            if self._definition.getActiveInput(name) is None:
-                self._context.warn(self._path, f"has no input '{name}'.")
-        metalness = float(_mean_of(self._get("metalness"))[0])
+        for names, _, gate in self._model.not_carried:
+            if not gate or self._reaches(gate):
+                self._lost += [n.strip() for n in names.split(",") if self._is_changed(n.strip())]
+        metalness = float(self._get("metalness").mean()[0])
         transmission = self._get("transmission")
         subsurface = self._get("subsurface")
         is_clear = metalness < 0.5 and (_largest(transmission) > 0.0 or _largest(subsurface) > 0.0)
@@ -198,17 +210,51 @@ class SurfaceModelReader:
 
     # -- inputs
 
+    def _warn_of_unknown_inputs(self) -> None:
+        known = [i.getName() for i in self._definition.getActiveInputs()]
+        for shader_input in self._shader.GetInputs():
+            name = shader_input.GetBaseName()
+            if name not in known and shader_input.GetValueProducingAttributes():
+                nearest = difflib.get_close_matches(name, known, n=1, cutoff=0.0)[0]
+                self._context.warn(self._path, f"has no input '{name}'. The nearest is '{nearest}'.")
+
     def _get(self, role: str) -> Expression:
-        """What feeds an input, or its default."""
+        """What feeds an input, in range, or its default."""
         name = getattr(self._model, role)
         if not name:
             return Expression.constant(0.0)
+        if name not in self._fed:
+            self._fed[name] = self._checked(name, role)
+        self._read.append(self._fed[name])
+        return self._fed[name]
+
+    def _checked(self, name: str, role: str) -> Expression:
+        found = self._definition.getActiveInput(name)
+        default = found.getValue()
+        default = np.atleast_1d(np.asarray(default.asTuple() if hasattr(default, "asTuple") else default, np.float64))
         fed = self._reader.read(self._shader, name)
-        if fed is None:
-            value = self._definition.getActiveInput(name).getValue()
-            fed = Expression.constant(value.asTuple() if hasattr(value, "asTuple") else value)
-        self._read.append(fed)
-        return fed
+        raw = self._reader.raw(self._shader, name) if fed is None else None
+        if fed is None and raw is None:
+            return Expression(default)
+        if fed is not None and (fed.image is not None or fed.is_display_color):
+            return fed
+        # A fourth number is alpha.
+        is_right = fed is not None and fed.width in (1, len(default), len(default) + 1)
+        value = fed.bias[: len(default)] if is_right else default
+        if not is_right or not np.isfinite(value).all():
+            rule = "finite" if is_right else f"a {found.getType()}"
+            got = repr(raw) if fed is None else number_text(fed.bias)
+            self._context.warn(self._path, f"{name} must be {rule}, got {got}. {number_text(default)} is used.")
+            return Expression(default)
+        low = _bound(found.getAttribute("uimin"), 1.0 if role == "ior" else 0.0)
+        high = np.inf if role in _UNBOUNDED else _bound(found.getAttribute("uimax"), np.inf)
+        clamped = np.clip(value, low, high)
+        if (clamped != value).any():
+            rule = f"in {low:g}..{high:g}" if np.isfinite(high) else f">= {low:g}"
+            self._context.warn(
+                self._path, f"{name} must be {rule}, got {number_text(value)}. {number_text(clamped)} is used."
+            )
+        return Expression(clamped)
 
     def _number(self, role: str) -> float:
         """A number where only one will do: the mean of an image."""
@@ -216,10 +262,16 @@ class SurfaceModelReader:
 
     def _mean(self, role: str) -> np.ndarray:
         fed = self._get(role)
-        if fed.image is None:
-            return fed.bias
-        self._context.warn(self._path, f"{getattr(self._model, role)} takes no texture here. Its mean is used.")
-        return _mean_of(fed)
+        if fed.image is not None:
+            self._context.warn(self._path, f"{getattr(self._model, role)} takes no texture here. Its mean is used.")
+        return fed.mean()
+
+    def _reaches(self, name: str) -> bool:
+        """Whether a weight may be above 0 anywhere."""
+        fed = self._reader.read(self._shader, name)
+        if fed is None:
+            return False
+        return _largest(fed) > 0.0
 
     def _is_changed(self, name: str) -> bool:
         fed = self._reader.read(self._shader, name)
@@ -235,6 +287,10 @@ class SurfaceModelReader:
         return fed.image is not None or not is_close(fed.bias, value)
 
     def _product(self, a: Expression, b: Expression, name: str) -> Expression:
+        if b.is_display_color:
+            if a.image is not None or not is_close(a.bias, 1.0):
+                self._lost.append(name)
+            return b
         if a.image is None:
             return b.affine(a.bias, 0.0)
         if b.image is None:
@@ -247,19 +303,39 @@ class SurfaceModelReader:
     def _normal(self):
         fed = self._reader.read(self._shader, self._model.normal)
         if fed is None or fed.image is None:
-            return None
+            return None  # the surface's own
         self._read.append(fed)
-        return fed.to_lookup(self._context, self._path, 3)
+        return self._value(find_input(PREVIEW_INPUTS, "normal"), fed)
+
+    def _check_coat_normal(self) -> None:
+        """One normal turns base and coat; name a coat that has another."""
+        base, coat = (self._reader.read(self._shader, n) for n in (self._model.normal, self._model.coat_normal))
+        keys = [None if e is None or e.image is None else e.key() for e in (base, coat)]
+        if keys[0] != keys[1] and self._reaches(self._model.coat):
+            self._lost.append(self._model.coat_normal)
+
+    def _grey(self, role: str) -> Expression:
+        """A color where only a number will do: its mean."""
+        fed = self._get(role)
+        if fed.width == 1 or (fed.image is not None and len(set(fed.channels[:3])) == 1):
+            return fed.component(0)
+        if fed.image is not None:
+            return bake([fed], lambda x: x[..., :3].mean(axis=-1, keepdims=True), role, self._context, self._path)
+        if not is_close(fed.bias[:3], fed.bias[0]):
+            name = getattr(self._model, role)
+            self._context.warn(self._path, f"{name} has a color, which is not supported. Its mean is used.")
+        return Expression.constant(fed.bias[:3].mean())
 
     # -- materials
 
     def _standard(self) -> StandardMaterial:
         row = {r.name: r for r in PREVIEW_INPUTS}
         color = self._product(self._get("base"), self._get("base_color"), "base")
-        specular, ior = self._number("specular"), max(self._number("ior"), 1.0)
+        specular, ior = self._number("specular"), self._number("ior")
         specular_color = self._mean("specular_color")
         metalness = self._get("metalness")
         f0 = ((ior - 1.0) / (ior + 1.0)) ** 2 * specular
+        self._check_coat_normal()
         is_tinted = not is_close(specular_color, 1.0) and metalness.image is None and float(metalness.bias[0]) == 0.0
         if not is_close(specular_color, 1.0) and not is_tinted:
             self._lost.append(self._model.specular_color)
@@ -274,7 +350,7 @@ class SurfaceModelReader:
             roughness=self._value(row["roughness"], self._get("roughness")),
             clearcoat=self._value(row["clearcoat"], self._get("coat")),
             clearcoat_roughness=self._value(row["clearcoatRoughness"], self._get("coat_roughness")),
-            opacity=self._value(row["opacity"], self._get("opacity").component(0)),
+            opacity=self._value(row["opacity"], self._grey("opacity")),
             ior=ior_of_f0(f0),
             normal=self._normal(),
         )
@@ -320,11 +396,9 @@ class SurfaceModelReader:
         """The opaque diffuse part, 1 - weight, as an overlay."""
         if _smallest(weight) >= 1.0:
             return []
-        color = np.clip(
-            _mean_of(self._product(self._get("base"), self._get("base_color"), "base").widened(3)), 0.0, 1.0
-        )
+        color = np.clip(self._product(self._get("base"), self._get("base_color"), "base").widened(3).mean(), 0.0, 1.0)
         layer = {"pattern": "solid", "color": tuple(color.tolist()), "scattering": 1.0, "age_end": 0.0}
-        roughness = float(np.clip(_mean_of(self._get("roughness"))[0], 0.0, 1.0))
+        roughness = float(np.clip(self._get("roughness").mean()[0], 0.0, 1.0))
         cover = weight.component(0).affine(-1.0, 1.0)
         if cover.image is None:
             return [Overlay(**layer, roughness=roughness, opacity=float(np.clip(cover.bias[0], 0.0, 1.0)))]
@@ -347,7 +421,7 @@ class SurfaceModelReader:
 
     def _scattering(self, unit: float, eta: float, tint_row: MaterialInput):
         color = self._get("subsurface_color").widened(3)
-        mean = np.clip(_mean_of(color), 1e-3, _LARGEST_ALBEDO)
+        mean = np.clip(color.mean(), 1e-3, _LARGEST_ALBEDO)
         tint = (1.0, 1.0, 1.0)
         if color.image is not None:
             tint = self._value(tint_row, color.affine(1.0 / mean, 0.0))
@@ -357,11 +431,9 @@ class SurfaceModelReader:
         return Medium.from_albedo(mean.tolist(), radius.tolist(), eta, find_input(ICE_INPUTS, "profile").default), tint
 
 
-def _mean_of(value: Expression) -> np.ndarray:
-    """The mean over all texels."""
-    if value.image is None:
-        return value.bias
-    return np.mean([value.evaluate(n).mean(axis=(0, 1)) for n in sorted(value.image.tiles)], axis=0)
+def _bound(text: str, otherwise: float) -> float:
+    """The first number of uimin or uimax."""
+    return float(text.split(",")[0]) if text else otherwise
 
 
 def _largest(value: Expression) -> float:

@@ -47,6 +47,7 @@ class Image:
     tiles: dict[int, Callable[[], np.ndarray]]
     channels: int
     is_8_bit: bool = False
+    is_decoded: bool = False  # from a colour space: not the numbers of the file
     missing: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
     notes: list[str] = field(default_factory=list)
     _pixels: dict[int, np.ndarray] = field(default_factory=dict)
@@ -56,6 +57,11 @@ class Image:
     def has_alpha(self) -> bool:
         """Whether channel 3 is anything but 1."""
         return self.channels in (2, 4)
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it is read as it is stored, not worked out."""
+        return self.key[0] == "file"
 
     @property
     def is_udim(self) -> bool:
@@ -230,9 +236,15 @@ def open_image(
             continue
         image.channels, image.is_8_bit = max(image.channels, channels), image.is_8_bit and is_8_bit
         image.tiles[number] = _loader(path, color_space, image.notes)
+    image.is_decoded = _is_decoded(color_space, image.channels, image.is_8_bit)
     if image.tiles:
         known[key] = image
     return known[key]
+
+
+def _is_decoded(color_space: str, channels: int, is_8_bit: bool) -> bool:
+    name = color_space.lower()
+    return (is_8_bit and channels >= 3) if name == "auto" else name not in _RAW_NAMES
 
 
 def _look_at(path: str) -> tuple[int, bool]:
@@ -274,12 +286,9 @@ def to_linear(pixels: np.ndarray, color_space: str, is_8_bit: bool) -> np.ndarra
     """Pixels of a colour space as linear Rec.709; alpha stays. ValueError for a space that nobody knows."""
     if pixels.shape[2] == 2:  # grey and alpha
         pixels = pixels[..., [0, 0, 0, 1]]
-    name = color_space.lower()
-    if name == "auto":
-        name = "srgb" if is_8_bit and pixels.shape[2] >= 3 else "raw"
-    if name in _RAW_NAMES:
+    if not _is_decoded(color_space, pixels.shape[2], is_8_bit):
         return pixels
-    if name in _SRGB_NAMES:
+    if color_space.lower() in _SRGB_NAMES or color_space.lower() == "auto":
         return decode_srgb(pixels)
     color = np.repeat(pixels[..., :1], 3, axis=2) if pixels.shape[2] == 1 else pixels[..., :3]
     image = oiio.ImageBuf(oiio.ImageSpec(color.shape[1], color.shape[0], 3, oiio.FLOAT))
