@@ -43,7 +43,8 @@ class ShaderValues:
         if row.kind == "file":
             asset, attribute, _ = UsdNode(reader, shader).file(row.name)
             if asset is None or not asset.path:
-                return row.default
+                raw = reader.raw(shader, row.name)
+                return row.default if raw is None or asset is not None else self._wrong(row, raw)
             self.authored.add(row.name)
             found = resolve(self._context, asset, attribute)
             if not found:
@@ -129,6 +130,8 @@ def to_constant(context: ReadContext, path, row: MaterialInput, value):
         context.warn(path, f"{row.name} must be {row.rule}, got '{value}'. '{row.default}' is used.")
         return row.default
     array = np.asarray(value, dtype=np.float64)
+    if row.kind == "floats" and array.ndim != 1:
+        raise ValueError(f"{row.name} must have one number after another")
     if row.kind in ("color", "vector") and array.size == 1:
         array = np.repeat(array.reshape(1), 3)
     if row.kind in ("color", "vector") and array.size == 4:

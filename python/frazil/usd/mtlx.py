@@ -116,7 +116,7 @@ class _Material:
         key = node.getNamePath()
         if key in self._nodes:
             return self._nodes[key]
-        definition = node.getNodeDef()
+        definition = _definition_of(node)
         name = self._material.GetPath()
         for part in key.split("/"):
             name = name.AppendChild(_identifier(part))
@@ -255,6 +255,21 @@ class _Material:
         name = holder.getNamePath()
         self._context.warn(self._path, f"{name} has the unit '{unit}', which is not known. It is ignored.")
         return 1.0
+
+
+def _definition_of(node: mx.Node) -> mx.NodeDef | None:
+    """What defines a node; one of its name and type where its inputs fit none, so that only those are left out."""
+    found = node.getNodeDef()
+    if found is not None:
+        return found
+    alike = [d for d in library().getMatchingNodeDefs(node.getCategory()) if d.getType() == node.getType()]
+
+    def misfits(definition: mx.NodeDef) -> int:
+        types = {i.getName(): i.getType() for i in definition.getActiveInputs()}
+        return sum(types.get(i.getName()) != i.getType() for i in node.getInputs())
+
+    # The default version wins among those that fit as well.
+    return min(alike, key=lambda d: (misfits(d), not d.getDefaultVersion()), default=None)
 
 
 def _identifier(name: str) -> str:

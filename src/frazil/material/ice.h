@@ -25,7 +25,7 @@ struct IceMaterial {
     float specular = 1.0f;                   // weight of the reflection, 0..1
     float translucency = 1.0f;               // weight of the core, 0..1
     float refraction = 1.0f;                 // how much of what the medium leaves unscattered is seen, 0..1
-    float refraction_roughness = -1.0f;      // of light that goes through the boundary, 0..1; below 0 = as roughness
+    float refraction_roughness = -1.0f;      // of light that goes through the boundary, 0..1; -1 = as roughness
     Rgb refraction_tint = Rgb(1.0f);         // of light each time that it goes through the boundary unscattered, 0..1
     float volume = 0.0f;                     // how much of the light scattered once is traced, 0..1
     float anisotropy = 0.0f;                 // g of the once-scattered light (Henyey-Greenstein)

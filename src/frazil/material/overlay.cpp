@@ -16,6 +16,7 @@ void check_overlay(const Overlay& overlay, const std::string& path) {
     fraction(overlay.roughness, "roughness must be in 0..1");
     fraction(overlay.scattering, "scattering must be in 0..1");
     fraction(overlay.internal, "internal must be in 0..1");
+    if (!overlay.mask.lookup.texture) fraction(overlay.mask.value, "mask must be in 0..1");
     require(std::isfinite(overlay.bump), "bump must be finite", overlay.bump);
     fraction(overlay.age_begin, "age_begin must be in 0..1");
     require(overlay.age_end >= overlay.age_begin && overlay.age_end <= 1.0f, "age_end must be in age_begin..1",
