@@ -1,4 +1,4 @@
-"""Bump and normal maps: the shading normal is that of the height's own slope, however the image is laid on the surface."""
+"""Bump and normal maps: the shading normal is that of the height's slope, however the image is laid on."""
 
 import warnings
 

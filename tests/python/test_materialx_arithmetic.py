@@ -66,9 +66,7 @@ VECTORS = {
     "rotate2d": ("vector2", value("in", "vector2", "0.5, 0") + value("amount", "float", "-30"), (0.4330127, 0.25, 0)),
     "rotate3d": (
         "vector3",
-        value("in", "vector3", "0.5, 0, 0")
-        + value("amount", "float", "-90")
-        + value("axis", "vector3", "0, 0, 2"),
+        value("in", "vector3", "0.5, 0, 0") + value("amount", "float", "-90") + value("axis", "vector3", "0, 0, 2"),
         (0, 0.5, 0),
     ),
     "crossproduct": ("vector3", value("in1", "vector3", "1, 0, 0") + value("in2", "vector3", "0, 1, 0"), (0, 0, 1)),

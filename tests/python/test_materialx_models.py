@@ -1,10 +1,11 @@
 """MaterialX: what becomes of standard_surface and open_pbr_surface."""
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
-from mtlx_documents import model_of, refer, surface, value
+from mtlx_documents import fed, image, model_of, refer, surface, value
 from pxr import Gf
-from test_usd_materials import COLOR, FLOAT, bind
+from test_usd_materials import COLOR, FLOAT, bind, write_image
 from usd_stages import add_quad, load, new_stage
 
 import frazil as fz
@@ -201,6 +202,65 @@ def test_what_is_not_carried_over_is_named_once_and_only_where_it_matters(stage,
     _, said = refer(stage, tmp_path, surface("standard_surface", inputs))
     assert len(said) == 1
     assert "/Looks/Mine/shader: sheen, thin_film_thickness, thin_walled: not carried over" in said[0]
+
+
+def test_what_has_no_weight_is_not_named(stage, tmp_path):
+    inputs = (
+        value("coat_color", "color3", "1, 0, 0")
+        + value("sheen_color", "color3", "1, 0, 0")
+        + value("thin_film_IOR", "float", "2")
+        + value("transmission_dispersion", "float", "20")
+    )
+    assert refer(stage, tmp_path, surface("standard_surface", inputs))[1] == []
+    _, said = refer(stage, tmp_path, surface("standard_surface", inputs + value("coat", "float", "0.1")))
+    assert said == ["/Looks/Mine/shader: coat_color: not carried over (docs/material.md)."]
+
+
+@pytest.mark.parametrize(("kind", "prefix"), [("standard_surface", ""), ("open_pbr_surface", "geometry_")])
+def test_a_coat_with_another_normal_than_the_base_is_named(stage, tmp_path, kind, prefix):
+    write_image(tmp_path / "n.exr", np.full((2, 2, 3), (0.5, 0.5, 1.0)), oiio.FLOAT)
+    graph = image("pic", "n.exr", "vector3")
+    graph += f'<normalmap name="n" type="vector3">{fed("in", "vector3", "pic")}</normalmap>'
+    coat = value("coat" if kind == "standard_surface" else "coat_weight", "float", "0.5")
+    base, own = (fed(f"{prefix}{n}", "vector3", "n") for n in ("normal", "coat_normal"))
+    for inputs, is_named in ((base + own + coat, False), (base + coat, True), (own + coat, True), (base, False)):
+        _, said = refer(stage, tmp_path, surface(kind, inputs, graph))
+        expected = [f"/Looks/Mine/shader: {prefix}coat_normal: not carried over (docs/material.md)."]
+        assert said == (expected if is_named else []), inputs
+
+
+def test_an_opacity_with_a_color_is_its_mean_and_named(stage, tmp_path):
+    model, said = refer(stage, tmp_path, surface("standard_surface", value("opacity", "color3", "1, 0.5, 0")))
+    assert model.opacity == pytest.approx(0.5)
+    assert said == ["/Looks/Mine/shader: opacity has a color, which is not supported. Its mean is used."]
+    write_image(tmp_path / "o.exr", np.full((2, 2, 3), (0.9, 0.6, 0.3)), oiio.FLOAT)
+    inputs = fed("opacity", "color3", "pic")
+    model, said = refer(stage, tmp_path, surface("standard_surface", inputs, image("pic", "o.exr")))
+    np.testing.assert_allclose(model.opacity.texture.texels, 0.6, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "rule", "used"),
+    [
+        ("specular_IOR", "0.5", ">= 1", "1"),
+        ("specular_IOR", "nan", "finite", "1.5"),
+        ("coat", "1.5", "in 0..1", "1"),
+        ("subsurface_scale", "-1", ">= 0", "0"),
+        ("transmission_scatter_anisotropy", "-2", "in -1..1", "-1"),
+    ],
+)
+def test_values_out_of_the_definitions_range_are_named(stage, name, text, rule, used):
+    shader = bind(stage, add_quad(stage, "/Quad"), "ND_standard_surface_surfaceshader", context="mtlx")
+    shader.CreateInput("transmission", FLOAT).Set(0.1)
+    shader.CreateInput("subsurface", FLOAT).Set(0.9)
+    shader.CreateInput("transmission_depth", FLOAT).Set(1.0)
+    shader.CreateInput(name, FLOAT).Set(float(text))
+    scene = load(stage)
+    expected = f"/Material/Surface: {name} must be {rule}, got {text}. {used} is used."
+    if name.startswith("transmission"):  # read where there is more of it than of subsurface
+        shader.GetInput("subsurface").Set(0.0)
+        scene = load(stage)
+    assert expected in scene.warnings
 
 
 def test_every_input_of_the_models_is_carried_or_listed():

@@ -132,7 +132,7 @@ class _Material:
         return shader
 
     def _write_input(self, shader: UsdShade.Shader, node_input: mx.Input) -> None:
-        if node_input.getType() in ("overlayshader", "densityshader"):
+        if node_input.getType() in ("overlayshader", "densityshader", "surfaceshader"):
             kind = _VALUE_TYPES.Token
         else:
             kind = _TYPES.get(node_input.getType())

@@ -143,7 +143,9 @@ def _find(reader: ShaderReader, shader: UsdShade.Shader, name: str) -> Expressio
 
 
 def _is_on(reader: ShaderReader, shader: UsdShade.Shader, name: str) -> bool:
-    return bool(reader.raw(shader, name))
+    """Whether something is switched on; MDL's own switches are off unless they are authored."""
+    value = reader.raw(shader, name)
+    return shader.GetSourceAsset("mdl") is None if value is None else bool(value)
 
 
 def _image_of(reader: ShaderReader, shader: UsdShade.Shader, name: str) -> Expression | None:

@@ -162,6 +162,8 @@ MODELS = {
     "arnold:standard_surface": STANDARD_SURFACE,
     "standard_surface": STANDARD_SURFACE,
 }
+# What may be less, or may not be as little, as a definition says.
+_SMALLEST = {"ior": 1.0, "transmission_anisotropy": -1.0, "subsurface_anisotropy": -1.0}
 # What has a largest value in a definition and may be larger all the same.
 _UNBOUNDED = ("emission_color", "transmission_scatter")
 
@@ -246,7 +248,7 @@ class SurfaceModelReader:
             got = repr(raw) if fed is None else number_text(fed.bias)
             self._context.warn(self._path, f"{name} must be {rule}, got {got}. {number_text(default)} is used.")
             return Expression(default)
-        low = _bound(found.getAttribute("uimin"), 1.0 if role == "ior" else 0.0)
+        low = _SMALLEST.get(role, _bound(found.getAttribute("uimin"), 0.0))
         high = np.inf if role in _UNBOUNDED else _bound(found.getAttribute("uimax"), np.inf)
         clamped = np.clip(value, low, high)
         if (clamped != value).any():
