@@ -226,6 +226,61 @@ TEST_CASE("open ice is rendered as before, with a warning that names it") {
     CHECK(mean_inside(result.film, "refraction", 0) == 0.0);
 }
 
+TEST_CASE("ice that is inside out is turned round, and named: its core has the same light") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(0.5f), 1.31f, 0.3f, CompensationMode::off));
+    scene.lights = {dome(Rgb(1.0f))};
+    // Images keep their places: a corner has what it had.
+    Primvar<V2f>& uvs = scene.meshes[0].uvs;
+    uvs.interpolation = Interpolation::corner;
+    for (const V3i& t : scene.meshes[0].triangles) {
+        for (int k = 0; k < 3; ++k) {
+            const V3f& p = scene.meshes[0].positions[std::size_t(t[k])];
+            uvs.values.push_back(V2f(0.5f + 0.5f * p.x, 0.5f + 0.5f * p.y));
+        }
+    }
+    model(scene).roughness.lookup.texture = make_texture(2, 1, 1, {0.1f, 0.9f}, Wrap::clamp, Wrap::clamp);
+    const RenderResult right = render(scene, small());
+    Scene flipped = scene;
+    for (V3i& t : flipped.meshes[0].triangles) std::swap(t.y, t.z);
+    for (std::size_t i = 0; i < uvs.values.size(); i += 3) {
+        std::swap(flipped.meshes[0].uvs.values[i + 1], flipped.meshes[0].uvs.values[i + 2]);
+    }
+    const RenderResult turned = render(flipped, small());
+    for (const char* layer : {"translucency", "specular", "refraction"}) {
+        CAPTURE(layer);
+        const double expected = mean_inside(right.film, layer, 0);
+        CHECK(expected > 0.0);
+        CHECK(mean_inside(turned.film, layer, 0) == doctest::Approx(expected).epsilon(1e-3));
+    }
+    const auto names = [](const RenderResult& result) {
+        int count = 0;
+        for (const std::string& warning : result.stats.warnings) {
+            count += warning.find("/shape: the faces of ice must wind outwards") == 0;
+        }
+        return count;
+    };
+    CHECK(names(right) == 0);
+    CHECK(names(turned) == 1);
+    CHECK(flipped.meshes[0].triangles[0].y == scene.meshes[0].triangles[0].z);  // the scene stays as it was
+}
+
+TEST_CASE("ice whose faces wind both ways is named with where they do") {
+    Scene scene = scene_of(sphere(1.0f, 3), clear_ice(Rgb(0.5f), 1.31f, 0.3f));
+    scene.lights = {dome(Rgb(1.0f))};
+    for (std::size_t i = 0; i < scene.meshes[0].triangles.size(); i += 2) {
+        std::swap(scene.meshes[0].triangles[i].y, scene.meshes[0].triangles[i].z);
+    }
+    const RenderResult result = render(scene, small());
+    bool is_named = false;
+    for (const std::string& warning : result.stats.warnings) {
+        is_named = is_named || warning.find(
+                                   "/shape: the faces of ice must all wind outwards, got faces that wind "
+                                   "both ways along ") == 0;
+    }
+    CHECK(is_named);
+    CHECK(mean_inside(result.film, "refraction", 0) == 0.0);
+}
+
 TEST_CASE("the refraction multiplier of a light acts on what is seen through ice alone") {
     Scene scene = scene_of(sphere(1.0f, 4), clear_ice(Rgb(0.1f), 1.31f, 0.2f));
     scene.lights = {dome(Rgb(1.0f))};

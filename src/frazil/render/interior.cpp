@@ -21,6 +21,7 @@ constexpr float kFarAway = 1e18f;  // metres; finite, so that 0 times it is 0
 struct Enclosure {
     double volume = 0.0;  // signed by the winding
     double rim = 0.0;     // length of edges that are not walked both ways
+    double turned = 0.0;  // of those that two triangles share which wind different ways
     double area = 0.0;
 };
 
@@ -64,11 +65,12 @@ Enclosure enclosure(const Mesh& mesh) {
     }
     std::sort(edges.begin(), edges.end());
     for (std::size_t i = 0; i < edges.size();) {
-        int balance = 0;
+        int balance = 0, count = 0;
         const std::uint64_t edge = edges[i].first;
-        for (; i < edges.size() && edges[i].first == edge; ++i) balance += edges[i].second;
+        for (; i < edges.size() && edges[i].first == edge; ++i, ++count) balance += edges[i].second;
         const V3f along = mesh.positions[std::size_t(edge >> 32)] - mesh.positions[std::size_t(edge & 0xffffffffU)];
         result.rim += std::abs(balance) * double(along.length());
+        if (count == 2 && balance != 0) result.turned += std::abs(balance) * double(along.length());
     }
     return result;
 }
@@ -120,10 +122,19 @@ Interiors::Interiors(const Scene& scene, const RayScene& ray_scene, const Surfac
         if (is_new) found->second = enclosure(scene.meshes[mesh]);
         const Enclosure& shape = found->second;
         if (!is_closed(shape)) {
-            warnings_.push_back(str(scene.objects[i].path,
-                                    ": the mesh must be closed to be seen into, got open edges of ", shape.rim,
-                                    " units. It is rendered without refraction and volume; close its holes, "
-                                    "or set the material's refraction to 0."));
+            const std::string& path = scene.objects[i].path;
+            const std::string without = " units. It is rendered without refraction and volume; ";
+            if (shape.turned > 0.5 * shape.rim) {
+                warnings_.push_back(
+                    str(path,
+                        ": the faces of ice must all wind outwards, got faces that wind both ways "
+                        "along ",
+                        0.5 * shape.turned, without,
+                        "make its normals consistent. The core's light is missing where they point in."));
+            } else {
+                warnings_.push_back(str(path, ": the mesh must be closed to be seen into, got open edges of ",
+                                        shape.rim, without, "close its holes, or set the material's refraction to 0."));
+            }
             continue;
         }
         outward_[i] = shape.volume > 0.0 ? 1.0f : -1.0f;

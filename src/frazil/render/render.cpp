@@ -15,6 +15,7 @@
 #include "frazil/render/film_layout.h"
 #include "frazil/render/film_sums.h"
 #include "frazil/render/gathering.h"
+#include "frazil/render/inside_out.h"
 #include "frazil/render/motion.h"
 #include "frazil/render/openness.h"
 #include "frazil/render/overlay_layers.h"
@@ -352,19 +353,33 @@ BakeResult bake_in_arena(const Scene& scene, const RenderOptions& options, Bake 
     return {std::move(result), std::move(stats)};
 }
 
+void add_warnings(RenderStats& stats, const std::vector<std::string>& more) {
+    stats.warnings.insert(stats.warnings.end(), more.begin(), more.end());
+}
+
 }  // namespace
 
 BakeResult bake(const Scene& scene, const RenderOptions& options, Bake known, Progress* progress) {
     check_options(options);
     check_scene(scene);
-    return with_threads(options.threads, [&] { return bake_in_arena(scene, options, std::move(known), progress); });
+    const TurnedScene turned = turned_outwards(scene);
+    const Scene& seen = turned.scene ? *turned.scene : scene;
+    BakeResult result =
+        with_threads(options.threads, [&] { return bake_in_arena(seen, options, std::move(known), progress); });
+    add_warnings(result.stats, turned.warnings);
+    return result;
 }
 
 RenderResult render(const Scene& scene, const RenderOptions& options, Progress* progress, const Bake* baked,
                     const Checkpoints* checkpoints) {
     check_options(options);
     check_scene(scene);
-    return with_threads(options.threads, [&] { return render_in_arena(scene, options, progress, baked, checkpoints); });
+    const TurnedScene turned = turned_outwards(scene);
+    const Scene& seen = turned.scene ? *turned.scene : scene;
+    RenderResult result =
+        with_threads(options.threads, [&] { return render_in_arena(seen, options, progress, baked, checkpoints); });
+    add_warnings(result.stats, turned.warnings);
+    return result;
 }
 
 }  // namespace frazil

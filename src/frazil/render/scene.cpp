@@ -10,12 +10,12 @@ namespace {
 
 // Refuses the values of one material that are out of range, by its path.
 class MaterialCheck {
-public:
+  public:
     explicit MaterialCheck(const Material& material) : path_(material.path) {
         std::visit([&](const auto& model) { check(model); }, material.model);
     }
 
-private:
+  private:
     void check(const IceMaterial& ice) const {
         check_medium(ice.medium, path_);
         if (!ice.ramp.is_empty() || !ice.ramp.colors.empty()) check_ramp(ice.ramp, path_ + ": ramp");
