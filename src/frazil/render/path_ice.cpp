@@ -119,6 +119,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         request_gather(path, core_at(surface, crossing.from, true), Rgb(1.0f), tile);
         return false;
     }
+    if (path.inner >= kInnerBouncesBeforeRoulette && !path.survives(kInnerChance)) return false;
     ++path.inner;
     // What lies on the boundary is seen from below as the core sees it.
     if (const float covered = surface.covering.covered; covered > kHiding) {

@@ -26,8 +26,9 @@ constexpr std::uint32_t kSplitVertex = 64;
 constexpr std::uint32_t kTransparencyDimensions = 4096, kSheetDimensions = 16384, kFillDimensions = 32768,
                         kOpennessDimensions = 49152;
 // Surfaces that a path goes through without a lobe; meetings with the boundary from inside, after which the core answers
-// for what is left.
-constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 8;
+// for what is left, and those after which only some go on, each with that chance.
+constexpr int kMaxTransparentHits = 64, kMaxInnerBounces = 24, kInnerBouncesBeforeRoulette = 8;
+constexpr float kInnerChance = 0.75f;
 // How much wider a diffuse lobe makes the cone that a path stands for, per metre: a sample stands for some percent of the
 // hemisphere.
 constexpr float kDiffuseSpread = 0.2f;
