@@ -61,6 +61,11 @@ $(STAMPS)/test: $(STAMPS)/runtime
 	@scripts/setup.sh python $(VENV) test
 	@touch $@
 
+$(STAMPS)/denoise: $(STAMPS)/runtime pyproject.toml
+	@echo "setup: the denoiser"
+	@scripts/setup.sh python $(VENV) denoise
+	@touch $@
+
 $(STAMPS)/docs: $(STAMPS)/venv pyproject.toml
 	@echo "setup: Python packages for the documentation's site"
 	@scripts/setup.sh python $(VENV) docs
@@ -86,12 +91,12 @@ build: $(STAMPS)/package ## Build and install the package into .venv
 
 # ---- render ---------------------------------------------------------------------------------------------------------
 
-render: $(STAMPS)/package ## Render the example scene: RESOLUTION=960x540 SAMPLES=32
+render: $(STAMPS)/package $(STAMPS)/denoise ## Render the example scene: RESOLUTION=960x540 SAMPLES=32
 	@mkdir -p $(OUT)
 	@python examples/glacier.py -o $(OUT)/glacier.usda --detail $(DETAIL)
-	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES)
+	@frazil render $(OUT)/glacier.usda -o $(OUT)/glacier.exr --resolution $(RESOLUTION) --samples $(SAMPLES) --denoise
 
-figures: $(STAMPS)/package ## Render the talk's figures anew into docs/images: FIGURE_RESOLUTION=320x180
+figures: $(STAMPS)/package $(STAMPS)/denoise ## Render the talk's figures anew into docs/images: FIGURE_RESOLUTION=320x180
 	@$(PIP_INSTALL) matplotlib Pillow
 	@python examples/figures.py -o docs/images --work $(OUT)/figures --resolution $(FIGURE_RESOLUTION) --samples $(FIGURE_SAMPLES)
 

@@ -20,6 +20,7 @@ from pxr import Sdf, Usd, UsdShade
 
 import frazil as fz
 import teapot
+from frazil.denoise import denoise_film
 from frazil.image import display_rgb
 
 _LABEL_HEIGHT = 20
@@ -73,7 +74,7 @@ class Studio:
                 continue
             for name, value in ice.items():
                 types = Sdf.ValueTypeNames
-                kind = types.Float
+                kind = types.Color3f if isinstance(value, tuple) else types.Float
                 if isinstance(value, list):
                     kind = types.Color3fArray if name == "ramp_colors" else types.FloatArray
                 shader.CreateInput(name, kind).Set(value)
@@ -94,7 +95,7 @@ def painted(linear: np.ndarray) -> np.ndarray:
 
 def figure_1(studio: Studio, out: Path) -> dict:
     """Figures 1 and 8: a render brought to a painting by its lights alone."""
-    film = studio.render(studio.scene(fz.formations.spire_cluster(seed=1, triangles=150_000)))
+    film = studio.render(studio.scene(fz.formations.spire_cluster(seed=1, triangles=150_000)), denoise=True)
     dusk = {"lights": {"sky": {"color": [0.35, 0.45, 0.72]}, "sun": {"color": [0.8, 0.5, 0.26]}}}
     painting = painted(fz.grade(film, dusk)["beauty"][..., :3])
     start = time.process_time()
@@ -130,33 +131,33 @@ def figure_3(studio: Studio, out: Path) -> dict:
     """Figure 3: the ramp, colour by distance below the surface, changed after one render."""
     distances = [0.0, 0.04, 0.12, 0.35]
     white = [(1.0, 1.0, 1.0)] * 4
-    formation = fz.formations.ice_tips(seed=3, triangles=60_000)
-    look = {"refraction": 0.0, "ramp_distances": distances, "ramp_colors": white}
-    film = studio.render(studio.scene(formation, **look), aovs=["translucency_ramp"], bake_bounces=0)
     ramps = {
         "no ramp: the medium's own colours": white,
         "white near, cyan and deep blue far": [(1, 1, 1), (0.75, 1, 1), (0.2, 0.7, 1.0), (0.02, 0.2, 0.9)],
         "green glow inside": [(1, 1, 1), (0.7, 1.0, 0.8), (0.3, 1.0, 0.5), (0.05, 0.6, 0.3)],
         "rose near, violet far": [(1.0, 0.8, 0.75), (1.0, 0.55, 0.7), (0.6, 0.3, 1.0), (0.25, 0.1, 0.8)],
     }
+    formation = fz.formations.ice_tips(seed=0, triangles=60_000)
+    # Denser than glacier ice, so that light comes from as near as the tips are thick.
+    dense = {"sigma_s_prime": (45.0, 45.0, 45.0), "refraction": 0.0, "spacing": 0.008}
+    look = dense | {"ramp_distances": distances, "ramp_colors": white}
+    film = studio.render(studio.scene(formation, **look), aovs=["translucency_ramp"], bake_bounces=0)
+    # The same ramp by a new render, to see that the grade is that.
+    colors = ramps["white near, cyan and deep blue far"]
+    scene = studio.scene(formation, **(look | {"ramp_colors": colors}))
+    again = studio.render(scene, aovs=["translucency_ramp"], bake_bounces=0)["translucency"]
+    regraded = fz.grade(film, _ramp_recipe(colors), keep_layers=True)["translucency"]
+    error = np.sqrt(np.mean((regraded - again) ** 2)) / np.sqrt(np.mean(again**2))
+    denoise_film(film)
     panels, means, seconds = [], {}, 0.0
     for name, colors in ramps.items():
         start = time.process_time()
-        graded = fz.grade(
-            film, {"ramp": {"colors": [list(map(float, c)) for c in colors]}, "color": {"exposure": 0.6}}
-        )["beauty"]
+        graded = fz.grade(film, _ramp_recipe(colors))["beauty"]
         seconds = max(seconds, time.process_time() - start)
         panels.append((name, shown(graded)))
         ice = film["translucency"][..., 1] > 0.02
         means[name] = [round(float(v), 3) for v in graded[ice][:, :3].mean(axis=0)]
     write_sheet(out / "figure_3.png", panels, 2)
-    # The same ramp by a new render, to see that the grade is that.
-    colors = list(ramps.values())[1]
-    scene = studio.scene(formation, **(look | {"ramp_colors": colors}))
-    again = studio.render(scene, aovs=["translucency_ramp"], bake_bounces=0)["translucency"]
-    recipe = {"ramp": {"colors": [list(map(float, c)) for c in colors]}}
-    regraded = fz.grade(film, recipe, keep_layers=True)["translucency"]
-    error = np.sqrt(np.mean((regraded - again) ** 2)) / np.sqrt(np.mean(again**2))
     return {
         "grade, processor seconds": seconds,
         "mean colour of the ice": means,
@@ -165,11 +166,15 @@ def figure_3(studio: Studio, out: Path) -> dict:
     }
 
 
+def _ramp_recipe(colors: list[tuple[float, ...]]) -> dict:
+    return {"ramp": {"colors": [list(map(float, c)) for c in colors]}}
+
+
 def figure_4(studio: Studio, out: Path) -> dict:
     """Figure 4: tips with and without area compensation, and translucency from a tenth of the points."""
-    formation = fz.formations.ice_tips(seed=3, triangles=60_000)
+    formation = fz.formations.ice_tips(seed=0, triangles=60_000)
     scene = studio.scene(formation, refraction=0.0)
-    film = studio.render(scene, aovs=["compensation_off", "compensation_factor"])
+    film = studio.render(scene, aovs=["compensation_off", "compensation_factor"], denoise=True)
     factor = film["compensation_factor"][..., 1]
     off, on = film["compensation_off"], film["translucency"]
     ice = film["translucency"][..., 1] > 1e-3
@@ -307,15 +312,17 @@ def figure_7(studio: Studio, out: Path) -> dict:
     """Figure 7: what a picture is made of."""
     scene = studio.scene(fz.formations.spire_cluster(seed=1, triangles=150_000), volume=1.0)
     width, height = studio.resolution
-    film = studio.render(scene, resolution=(width * 3 // 4, height * 3 // 4), aovs=["compensation_factor"])
+    size = (width * 3 // 4, height * 3 // 4)
+    film = studio.render(scene, resolution=size, aovs=["compensation_factor"], denoise=True)
     additive = ("translucency", "refraction", "volume", "specular", "diffuse", "background", "emission")
     total = sum(film[name].astype(np.float64) for name in additive)
     panels = [("beauty = sum of:", shown(film["beauty"]))]
     panels += [(name, shown(film[name])) for name in additive if name != "emission"]
     panels += [(f"translucency by {group}", shown(film[f"translucency_{group}"])) for group in ("sky", "sun")]
     depth = film["Z"][..., 0]
-    panels.append(("Z", colored(-np.where(np.isfinite(depth), depth, np.nan), -12, -5, "bone")))
-    panels.append(("compensation_factor", colored(film["compensation_factor"][..., 1], -0.5, 1.0)))
+    panels.append(("Z, 5 to 12 m", colored(-np.where(np.isfinite(depth), depth, 1e9), -12, -5, "bone")))
+    factor = np.where(film["translucency"][..., 1] > 1e-3, film["compensation_factor"][..., 1], -9.0)
+    panels.append(("compensation_factor, -1 to 1", colored(factor, -1.0, 1.0, "inferno")))
     write_sheet(out / "figure_7.png", panels, 4)
     return {
         "largest difference of the sum": float(np.abs(total - film["beauty"][..., :3]).max()),

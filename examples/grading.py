@@ -54,7 +54,7 @@ kShown = [
 
 def scene() -> fz.Scene:
     """A block of ice with cracks and frost, a stone before it, on snow; sun, sky and a warm rim light."""
-    made = set_scene((1.35, 0.95, 2.75), (0.0, 0.44, 0.0), 58.0)
+    made = set_scene((1.35, 0.95, 2.75), (0.0, 0.44, 0.0), 58.0, has_groups=True)
     block = Block((0.95, 1.1, 0.7), 4)
     ice = fz.ice_preset("arctic_blue", age=0.9, depth=8.0, spacing=0.02, **kRamp)
     mesh = to_mesh(contour(block, *block.bounds(), 0.02).largest_piece())

@@ -66,7 +66,7 @@ def scene_with(multipliers: dict[str, float]) -> fz.Scene:
 
 
 def main(path: str = "light_targets.png") -> None:
-    pictures = [fz.render(scene_with(chosen), resolution=(180, 240), samples=64) for chosen in TARGETS]
+    pictures = [fz.render(scene_with(chosen), resolution=(180, 240), samples=32, denoise=True) for chosen in TARGETS]
     rows = [np.concatenate([film["beauty"][:, :, :3] for film in pictures[k : k + 4]], axis=1) for k in (0, 4)]
     write_png(path, np.concatenate(rows))
 

@@ -23,6 +23,26 @@ def test_units_and_up_axis_are_applied_once(tmp_path):
     np.testing.assert_allclose(positions, expected, atol=1e-6)
 
 
+def test_units_of_a_sublayer_alone_are_named(tmp_path):
+    below = new_stage(tmp_path / "below.usda", up="Z", meters_per_unit=1.0)
+    add_quad(below, "/Quad")
+    below.Save()
+    above = Usd.Stage.CreateNew(str(tmp_path / "above.usda"))
+    above.GetRootLayer().subLayerPaths.append("below.usda")
+    above.Save()
+    with pytest.warns(fz.FrazilWarning) as said:
+        fz.load_usd(tmp_path / "above.usda")
+    texts = [str(w.message) for w in said]
+    for key, value, taken in (("metersPerUnit", "1.0", "0.01"), ("upAxis", "Z", "Y")):
+        assert any(f"{key} must be authored in the root layer, got {value}" in t and f"as {taken}," in t for t in texts)
+    UsdGeom.SetStageMetersPerUnit(above, 0.01)
+    UsdGeom.SetStageUpAxis(above, "Y")
+    above.Save()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fz.load_usd(tmp_path / "above.usda")
+
+
 def test_camera_is_rigid_in_metres(tmp_path):
     stage = new_stage(tmp_path / "s.usda", up="Z", meters_per_unit=0.01)
     add_quad(stage, "/Quad")

@@ -103,7 +103,7 @@ def breath_burst(
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 1.0, budget, -0.10)]
-    image, lights = sky_and_lights(seed, (-0.75, 0.45, -0.55), sun_light=3.4)
+    image, lights = sky_and_lights(seed, (-0.75, 0.45, -0.55), budget, sun_light=3.4)
     return Formation(
         "breath_burst",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count, spread=spread),

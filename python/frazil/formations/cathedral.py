@@ -28,13 +28,13 @@ _SUN = (0.22, 0.88, -0.42)
 
 def cathedral(
     scale: float = 12.0,
-    age: float = 0.3,
+    age: float = 0.4,
     seed: int = 0,
     detail: float = 1.0,
     triangles: int | None = None,
     columns: int = 9,
     opening: float = 1.0,
-    rocks: int = 5,
+    rocks: int = 9,
     progress: Progress | None = None,
 ) -> Formation:
     """A hall of contorted columns of ice with an opening to the sky, rocks frozen in; the camera stands inside.
@@ -91,13 +91,13 @@ def cathedral(
     )
     parts = [Part.of("Ice", surface, "Ice", "ice", 50.0)]
     parts += _rocks(rng, hall, int(rocks), seed)
-    image, lights = sky_and_lights(seed, _SUN, sun_light=9.0, sky_light=1.7)
+    image, lights = sky_and_lights(seed, _SUN, budget, sun_light=10.0, sky_light=0.85)
     return Formation(
         "cathedral",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, columns=columns, opening=opening,
              rocks=rocks),
         parts,
-        {"Ice": ice("old_glacier", age, 3.0, refraction=0.3), "Rock": kRock},
+        {"Ice": ice("old_glacier", age, 3.0, depth=8.0, roughness=0.2, refraction=0.4), "Rock": kRock},
         lights,
         CameraRow((0.4, 1.9, 8.2), (-0.1, 4.1, -4.0), 20.0),
         image,

@@ -74,7 +74,7 @@ def ice_field(
     parameters = dict(count=count, prototypes=prototypes, seed=seed, triangles=triangles)
     camera = CameraRow((4.0, 7.0, extent + 9.0), (0.0, 0.0, 0.25 * extent), 30.0)
     ground = Formation("ice_field", parameters, [], {}, [], camera)
-    ground.sky, ground.lights = sky_and_lights(seed, (-0.85, 0.30, -0.45))
+    ground.sky, ground.lights = sky_and_lights(seed, (-0.85, 0.30, -0.45), triangles)
     ground.materials = {"Snow": kSnow}
     ground.parts = [snowfield(seed, 2.5, 400_000, -0.12, extent=1.5 * extent)]
     return Field(ground, made, rng.integers(0, prototypes, count), places)

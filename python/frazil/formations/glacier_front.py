@@ -120,7 +120,7 @@ def glacier_front(
 
     surface = grow(body, budget, rounding=0.08 + 0.5 * age**1.5, large=large, fine=melt.fine, progress=progress)
     parts = [Part.of("Ice", surface, "Ice", "ice"), water(seed, 8.0, budget, surface, 60.0, reach=4.0)]
-    image, lights = sky_and_lights(seed, (-0.8, 0.36, 0.5), sun_light=3.0)
+    image, lights = sky_and_lights(seed, (-0.9, 0.34, 0.12), budget, sun_light=3.6)
     return Formation(
         "glacier_front",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, crevasses=crevasses),

@@ -82,14 +82,14 @@ def icicles(
         at = (x + rng.uniform(-0.08, 0.08), 0.16 + 0.6 * size[1], -0.24)
         parts.append(rock_part(rng, f"Rock{k + 1}", at, size, seed + 31 * k, rime=0.5))
     parts.append(snowfield(seed, 0.6, budget, -1.5))
-    image, lights = sky_and_lights(seed, (0.65, 0.4, -0.65), sun_light=5.5)
+    image, lights = sky_and_lights(seed, (0.45, 0.3, -0.85), budget, sun_light=4.2, sky_light=0.7)
     return Formation(
         "icicles",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count),
         parts,
-        {"Ice": ice("fresh_breath", 0.5 * age, 0.6, refraction=0.9), "Rock": kRock, "Snow": kSnow},
+        {"Ice": ice("fresh_breath", 0.5 * age, 0.6, depth=5.0, refraction=0.9), "Rock": kRock, "Snow": kSnow},
         lights,
-        CameraRow((0.25, -0.42, 2.05), (0.0, -0.28, 0.0), 35.0),
+        CameraRow((0.25, -0.62, 1.8), (0.0, -0.24, 0.0), 35.0),
         image,
     ).scaled(scale / kLength)
 

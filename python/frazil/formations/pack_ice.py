@@ -101,14 +101,14 @@ def pack_ice(
     )
     surface = grow(body, budget, rounding=0.02 + 0.12 * age**1.5, large=melt.large, fine=melt.fine, progress=progress)
     parts = [Part.of("Ice", surface, "Ice", "ice"), water(seed, 3.0, budget, surface, 40.0, reach=0.9)]
-    image, lights = sky_and_lights(seed, (-0.8, 0.26, -0.55), sun_light=4.2)
+    image, lights = sky_and_lights(seed, (-0.7, 0.22, -0.7), budget, sun_light=3.0, sky_light=0.55)
     return Formation(
         "pack_ice",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count, leads=leads),
         parts,
         {"Ice": ice("sea_ice", 0.4 + 0.6 * age, 0.8), "Water": kWater},
         lights,
-        CameraRow((3.0, 6.5, 32.0), (0.0, 0.0, 6.0), 28.0),
+        CameraRow((3.0, 3.6, 32.0), (0.0, 0.4, 6.0), 32.0),
         image,
     ).scaled(scale / kWidth)
 

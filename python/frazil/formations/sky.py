@@ -17,6 +17,7 @@ kZenith = np.array([0.10, 0.22, 0.46])
 kHorizon = np.array([0.80, 0.92, 1.04])
 kGlow = np.array([1.0, 0.78, 0.52])
 kCloud = np.array([0.62, 0.70, 0.80])
+kHaze = (0.02, 0.16)  # sines of the elevations between which cloud comes out of the haze
 kSnowfield = np.array([0.46, 0.54, 0.66])
 
 
@@ -39,24 +40,32 @@ def make_sky(width: int, sun: np.ndarray, seed: int) -> np.ndarray:
     near_sun = np.exp(-(1.0 - toward_sun) / 0.05) + 0.35 * np.exp(-(1.0 - toward_sun) / 0.35)
     sky += near_sun[:, None] * kGlow * (0.4 + 0.9 * low)
 
-    sky = _add_clouds(sky, direction, toward_sun, noise)
+    sky = _add_clouds(sky, direction, toward_sun, noise, np.pi / height)
     sky = _add_ridges(sky, direction, toward_sun, noise)
     ground = kSnowfield * (0.75 + 0.25 * side)
     blend = np.clip(up / 0.004 + 0.5, 0.0, 1.0)[:, None]
     return (sky * blend + ground * (1.0 - blend)).reshape(height, width, 3).astype(np.float32)
 
 
-def _add_clouds(sky, direction, toward_sun, noise: Noise):
+def _add_clouds(sky, direction, toward_sun, noise: Noise, texel: float):
     up = direction[:, 1]
-    above = np.flatnonzero(up > 0.0)
+    above = np.flatnonzero(up > kHaze[0])
     d = direction[above]
     # A layer overhead, stretched along the wind.
     plane = d / (d[:, 1:2] + 0.10) * [0.55, 0.0, 1.0]
-    shape = noise.fractal(plane + 0.25 * swirl(plane, 1.6), 1.5, 5, 0, 0.55)
+    bent = plane + 0.25 * swirl(plane, 1.6)
+    # Octaves fade out where a texel sees more than half of a feature.
+    seen = texel / (d[:, 1] + 0.10) ** 2
+    shape = np.zeros(len(d))
+    for octave in range(5):
+        size = 1.5 * 0.5**octave
+        shown = np.clip(2.0 - 4.0 * seen / size, 0.0, 1.0)
+        shape += 0.55**octave * shown * noise(bent, size, octave)
     cover = np.clip((shape + 0.02) / 0.55, 0.0, 1.0)
-    cover = cover * cover * (3.0 - 2.0 * cover) * np.clip(d[:, 1] / 0.05, 0.0, 1.0)
+    hazy = np.clip((d[:, 1] - kHaze[0]) / (kHaze[1] - kHaze[0]), 0.0, 1.0)
+    cover = cover * cover * (3.0 - 2.0 * cover) * hazy * hazy * (3.0 - 2.0 * hazy)
     lining = np.exp(-(1.0 - toward_sun[above]) / 0.25) * (1.0 - cover) * 1.6
-    bright = 0.55 + 0.40 * np.clip(toward_sun[above], 0.0, 1.0) + 0.25 * (1.0 - cover)
+    bright = 0.55 + 0.40 * np.clip(toward_sun[above], 0.0, 1.0) + 0.25 * (1.0 - cover) - 0.14 * (shape - 0.5)
     color = kCloud * bright[:, None] + lining[:, None] * [1.0, 0.86, 0.70]
     result = sky.copy()
     result[above] += cover[:, None] * 0.85 * (color - sky[above])

@@ -91,7 +91,7 @@ def spire_cluster(
         return 0.22 * np.exp(-np.maximum(away - 0.75, 0.0) / 0.25) * (0.8 + 0.4 * swirl(p, 0.8)[:, 0])
 
     parts.append(snowfield(seed, 2.0, budget, -0.12, lift=drift))
-    image, lights = sky_and_lights(seed, _SUN, sun_light=3.4)
+    image, lights = sky_and_lights(seed, _SUN, budget, sun_light=3.4)
     return Formation(
         "spire_cluster",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count, lean=lean),
@@ -178,7 +178,7 @@ def ice_tips(
         progress=progress,
     )
     parts = [Part.of("Ice", surface, "Ice", "ice"), snowfield(seed, 0.5, budget, -0.10)]
-    image, lights = sky_and_lights(seed, (0.55, 0.35, -0.75), sun_light=3.4)
+    image, lights = sky_and_lights(seed, (0.55, 0.35, -0.75), budget, sun_light=3.4)
     return Formation(
         "ice_tips",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, count=count),

@@ -30,13 +30,17 @@ def ice(preset: str, age: float, size: float, depth: float | None = None, **inpu
     return MaterialRow("frazil:ice", row | inputs)
 
 
-def sky_and_lights(seed: int, sun, width: int = 512, sun_light: float = 4.4, sky_light: float = 0.9):
-    """The sky image and its two lights: the dome, and the sun in direction `sun` (3,)."""
+def sky_and_lights(seed: int, sun, budget: int, sun_light: float = 4.4, sky_light: float = 0.9):
+    """The sky image and its two lights: the dome, and the sun in direction `sun` (3,).
+
+    The image is as fine as the ice, whose `budget` of triangles it is told.
+    """
     sun = np.asarray(sun, np.float64)
+    width = int(np.clip(1280 * np.sqrt(budget / 400_000), 512, 2048)) // 2 * 2
     image = make_sky(width, sun, seed)
     return image, [
         LightRow("Sky", "dome", sky_light),
-        LightRow("Sun", "distant", sun_light, (1.0, 0.86, 0.70), toward=tuple(map(float, sun)), size=2.0),
+        LightRow("Sun", "distant", sun_light, (1.0, 0.92, 0.82), toward=tuple(map(float, sun)), size=2.0),
     ]
 
 

@@ -31,6 +31,7 @@ class ReadContext:
     _said: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
+        self._warn_of_units_below()
         self.meters_per_unit = UsdGeom.GetStageMetersPerUnit(self.stage)
         if not (np.isfinite(self.meters_per_unit) and self.meters_per_unit > 0):
             self.warn(self.file, f"metersPerUnit must be > 0, got {self.meters_per_unit}. Taken as 1.")
@@ -39,6 +40,21 @@ class ReadContext:
         turn = _Z_UP_TO_Y_UP if self.is_z_up else np.eye(4)
         self.stage_to_world = turn @ np.diag([self.meters_per_unit] * 3 + [1.0])
         self.transforms = UsdGeom.XformCache(self.time)
+
+    def _warn_of_units_below(self) -> None:
+        # USD takes what holds for a whole stage from its root layer alone.
+        root, *below = self.stage.GetLayerStack(includeSessionLayers=False)
+        for key, taken in (
+            ("metersPerUnit", UsdGeom.GetStageMetersPerUnit(self.stage)),
+            ("upAxis", UsdGeom.GetStageUpAxis(self.stage)),
+        ):
+            values = [layer.pseudoRoot.GetInfo(key) for layer in below if layer.pseudoRoot.HasInfo(key)]
+            if values and values[0] != taken and not root.pseudoRoot.HasInfo(key):
+                self.warn(
+                    self.file,
+                    f"{key} must be authored in the root layer, got {values[0]} in a sublayer alone. Taken as {taken}, "
+                    "as USD has it.",
+                )
 
     def warn(self, path: Sdf.Path | str, message: str, once: str = "") -> None:
         """Warn about one prim; with `once`, the same prim and key are named only the first time."""
