@@ -21,7 +21,7 @@ import frazil as fz
 from frazil.formations.sky import make_sky
 from frazil.image import write_png
 
-kSun = np.array([-0.8, 0.5, -0.35])
+kSun = np.array([-0.6, 0.75, 0.4])  # high enough that no block stands in another's shadow
 kTexels = 256
 kTypes = Sdf.ValueTypeNames
 
