@@ -21,7 +21,7 @@ import frazil as fz
 from frazil.formations.sky import make_sky
 from frazil.image import write_png
 
-kSun = np.array([-0.6, 0.75, 0.4])  # high enough that no block stands in another's shadow
+kSun = np.array([-0.8, 0.5, -0.35])
 kTexels = 256
 kTypes = Sdf.ValueTypeNames
 
@@ -127,7 +127,7 @@ def new_stage(path: Path, count: int) -> Usd.Stage:
     dome.CreateTextureFileAttr("./sky.exr")
     sun = UsdLux.DistantLight.Define(stage, "/Sun")
     sun.CreateAngleAttr(1.5)
-    sun.CreateIntensityAttr(3800.0)
+    sun.CreateIntensityAttr(5500.0)
     sun.CreateColorAttr(Gf.Vec3f(1.0, 0.86, 0.68))
     toward = Gf.Rotation(Gf.Vec3d(0, 0, 1), Gf.Vec3d(*kSun.tolist()))
     sun.AddOrientOp().Set(Gf.Quatf(toward.GetQuat()))

@@ -92,7 +92,7 @@ def iceberg(
 
     surface = grow(body, budget, rounding=0.06 + 0.4 * age**1.5, large=large, fine=melt.fine, progress=progress)
     parts = [Part.of("Ice", surface, "Ice", "ice"), water(seed, 6.0, budget, surface, 60.0, reach=2.5)]
-    image, lights = sky_and_lights(seed, (-0.9, 0.36, 0.12), budget, sun_light=3.6)
+    image, lights = sky_and_lights(seed, (-0.78, 0.38, 0.5), budget, sun_light=3.6)
     return Formation(
         "iceberg",
         dict(scale=scale, age=age, seed=seed, detail=detail, triangles=triangles, peaks=peaks),
