@@ -175,7 +175,8 @@ def depths(size: int, samples: int) -> np.ndarray:
     block = Block((2.0, 1.0, 1.1), 4)
     mesh = to_mesh(contour(block, *block.bounds(), 0.025).largest_piece())
     ice = scene.add_material(
-        "/ice", fz.ice_preset("arctic_blue", age=0.12, depth=kDepth, scale=2.0, roughness=0.04, refraction_roughness=0.05)
+        "/ice",
+        fz.ice_preset("arctic_blue", age=0.12, depth=kDepth, scale=2.0, roughness=0.04, refraction_roughness=0.05),
     )
     scene.add_object("/ice", scene.add_mesh(mesh, "/ice"), ice, lifted(0.46))
     stone = scene.add_material("/stone", fz.StandardMaterial(diffuse_color=(0.16, 0.13, 0.11), roughness=0.6))

@@ -14,7 +14,7 @@ from frazil.formations.noise import Noise, swirl
 from ice_body import IceBody, kLower, kUpper
 
 kSnowTop = 0.72  # metres above which no snow holds
-kSnowRoot = 0.05  # metres that snow reaches into the ice below
+kSnowRoot = 0.025  # metres that snow reaches into the ice below; deeper, it would show through walls
 
 
 class Rock:
