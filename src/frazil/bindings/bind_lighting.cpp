@@ -88,7 +88,7 @@ void bind_lighting(nb::module_& module) {
                 options.samples = samples, options.seed = seed;
                 options.error = error, options.max_rounds = max_rounds;
                 if (objects) options.objects = *objects;
-                const auto transmittance = [&](float cosine) { return 1.0f - albedo.eval(cosine, alpha); };
+                const auto transmittance = [&](float cosine) { return Rgb(1.0f - albedo.eval(cosine, alpha)); };
                 baked = bake_irradiance(set, scene, sampler, transmittance, options);
             }
             const std::size_t groups = baked->groups;
@@ -179,7 +179,7 @@ void bind_lighting(nb::module_& module) {
                     for (std::size_t i = begin; i < end; ++i) result[i] = scene.is_occluded(rays[i]);
                 });
             } else {
-                const auto full = [](float) { return 1.0f; };
+                const auto full = [](float) { return Rgb(1.0f); };
                 count = bake_irradiance(set, scene, sampler, full, options).rays;
             }
             return std::pair(count, double(std::clock() - start) / CLOCKS_PER_SEC);

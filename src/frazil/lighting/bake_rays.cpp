@@ -49,7 +49,7 @@ void sample_cosine(std::size_t begin, std::size_t end, BakeRays& rays) {
 
 }  // namespace
 
-EntryTable::EntryTable(const std::function<float(float)>& transmittance) : values_(kSteps + 2) {
+EntryTable::EntryTable(const Transmittance& transmittance) : values_(kSteps + 2) {
     for (int i = 0; i <= kSteps; ++i) values_[std::size_t(i)] = transmittance(float(i) / kSteps);
     values_.back() = values_[kSteps];
 }
@@ -243,7 +243,7 @@ void RayMaker::keep_useful(BakeRays& rays) const {
             const LightSample& sample = rays.samples[i];
             const float cosine = sample.direction.dot(place.normal);
             if (!(sample.pdf > 0.0f) || !(cosine > 0.0f)) continue;
-            const Rgb value = sample.radiance * (entry_(cosine) / sample.pdf);
+            const Rgb value = sample.radiance * entry_(cosine) / sample.pdf;
             if (value == Rgb(0.0f)) continue;
             if (!is_finite(value)) {
                 ++rays.dropped;

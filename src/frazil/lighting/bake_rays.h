@@ -22,17 +22,17 @@ namespace frazil {
 // cos * T(cos), read linearly from a table.
 class EntryTable {
   public:
-    explicit EntryTable(const std::function<float(float)>& transmittance);
-    float operator()(float cosine) const {
+    explicit EntryTable(const Transmittance& transmittance);
+    Rgb operator()(float cosine) const {
         const float x = std::min(cosine, 1.0f) * kSteps;
         const int i = int(x);
         const float f = x - float(i);
-        return cosine * (values_[std::size_t(i)] * (1.0f - f) + values_[std::size_t(i) + 1] * f);
+        return (values_[std::size_t(i)] * (1.0f - f) + values_[std::size_t(i) + 1] * f) * cosine;
     }
 
   private:
     static constexpr int kSteps = 1024;
-    std::vector<float> values_;
+    std::vector<Rgb> values_;
 };
 
 // The rays of one light, or crowd, at one point, and room for making them: kept from point to point.

@@ -11,7 +11,7 @@
 
 namespace frazil {
 Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_t groups,
-                       const BounceRadiance& radiance, const std::function<float(float)>& transmittance,
+                       const BounceRadiance& radiance, const Transmittance& transmittance,
                        const IrradianceOptions& options, Progress* progress) {
     if (options.samples < 1 || options.samples > (1 << 20)) {
         throw ValueError(str("bake_bounce: samples must be in [1, 2^20], got ", options.samples, "."));
@@ -48,8 +48,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.position = origin + hit.direction * hit.surface.t;
                 // Cosine-distributed rays leave pi T L / n.
-                hit.weight =
-                    kPi * transmittance(std::max(0.0f, hit.direction.dot(place.normal))) / float(options.samples);
+                hit.weight = transmittance(std::max(0.0f, hit.direction.dot(place.normal))) * (kPi / float(options.samples));
                 hits.push_back(hit);
             }
         }
@@ -98,7 +97,7 @@ BounceRadiance reflected_light(const RayScene& scene, const LightSampler& lights
         options.seed = hash(seed, hits.front().point);
         options.component = LightComponent::diffuse;
         const Irradiance direct = bake_irradiance(
-            lit, scene, lights, [](float) { return 1.0f; }, options);
+            lit, scene, lights, [](float) { return Rgb(1.0f); }, options);
         for (std::size_t i = 0; i < index.size(); ++i) {
             for (std::size_t g = 0; g < direct.groups; ++g) {
                 radiance[index[i] * direct.groups + g] = direct.values[i * direct.groups + g] * share[i];

@@ -20,7 +20,7 @@ struct BounceHit {
     std::uint32_t point = 0;  // index into the points
     V3f position;             // on the surface, metres
     V3f direction;            // from the point to the surface, unit length
-    float weight = 0.0f;      // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
+    Rgb weight = Rgb(0.0f);   // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
     Hit surface;
 };
 
@@ -33,7 +33,7 @@ using BounceRadiance = std::function<void(std::span<const BounceHit> hits, std::
 
 // (N, groups) irradiance that surfaces send to the points. options.samples counts rays per point.
 Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_t groups,
-                       const BounceRadiance& radiance, const std::function<float(float)>& transmittance,
+                       const BounceRadiance& radiance, const Transmittance& transmittance,
                        const IrradianceOptions& options = {}, Progress* progress = nullptr);
 
 // What opaque diffuse surfaces reflect: albedo / pi times their irradiance, `samples` shadow rays per hit and light, with

@@ -168,7 +168,7 @@ std::vector<std::string> light_groups(const std::vector<Light>& lights) {
 }
 
 Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
-                           const std::function<float(float)>& transmittance, const IrradianceOptions& options,
+                           const Transmittance& transmittance, const IrradianceOptions& options,
                            Progress* progress) {
     check_bake(points, options);
     const std::vector<std::string> groups = light_groups(lights.lights());
@@ -207,7 +207,7 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
 
 std::vector<Ray> shadow_rays(const PointSet& points, const LightSampler& lights, const IrradianceOptions& options) {
     check_bake(points, options);
-    const EntryTable entry([](float) { return 1.0f; });
+    const EntryTable entry([](float) { return Rgb(1.0f); });
     const RayMaker maker(points, lights, entry, options);
     std::vector<Ray> rays;
     BakeRays work;

@@ -24,6 +24,9 @@
 
 namespace frazil {
 
+// The fraction of light that enters at an angle whose cosine is this, per channel.
+using Transmittance = std::function<Rgb(float cosine)>;
+
 struct IrradianceOptions {
     int samples = 64;  // per point and light, 1 to 2^20; a power of two is stratified best
     std::uint32_t seed = 0;
@@ -61,7 +64,7 @@ std::vector<std::string> light_groups(const std::vector<Light>& lights);
 // boundary. It is tabulated once, at steps of 1/1024 in cos. ValueError for options out of
 // range or points without normals.
 Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
-                           const std::function<float(float)>& transmittance, const IrradianceOptions& options = {},
+                           const Transmittance& transmittance, const IrradianceOptions& options = {},
                            Progress* progress = nullptr);
 
 // The rays that bake_irradiance traces, in its order: what a bench needs to compare with bare ray tracing.

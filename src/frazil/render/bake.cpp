@@ -243,7 +243,7 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         }
         Irradiance irradiance = bake_irradiance(
             in_world, ray_scene, lights,
-            [&](float cosine) { return bodies[i]->transmittance(cosine, material.roughness.value); }, bake_options,
+            [&](float cosine) { return bodies[i]->enters(cosine, material.roughness.value); }, bake_options,
             progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;

@@ -17,6 +17,16 @@ namespace {
 // Thickness varies slowly: its gathers may be this much coarser.
 constexpr float kThicknessTolerance = 4.0f;
 
+double single_albedo(const Medium& medium, int channel) {
+    return medium.sigma_s_prime[channel] / (double(medium.sigma_s_prime[channel]) + medium.sigma_a[channel]);
+}
+
+std::shared_ptr<const std::array<DirectionalAlbedo, 3>> directional_albedos(const Medium& medium) {
+    auto result = std::make_shared<std::array<DirectionalAlbedo, 3>>();
+    for (int c = 0; c < 3; ++c) (*result)[c] = DirectionalAlbedo(single_albedo(medium, c), medium.eta);
+    return result;
+}
+
 }  // namespace
 
 float Body::transmittance(float cos_theta, float roughness) const {
@@ -27,6 +37,16 @@ float Body::transmittance_average(float roughness) const {
     return 1.0f - material->specular * boundary->average(alpha_from_roughness(roughness));
 }
 
+Rgb Body::angular_share(float cos_theta) const {
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)) / medium.eta;
+    const float mu = std::sqrt(std::max(0.0f, 1.0f - sine * sine));
+    return {(*by_angle)[0](mu), (*by_angle)[1](mu), (*by_angle)[2](mu)};
+}
+
+Rgb Body::enters(float cos_theta, float roughness) const {
+    return angular_share(cos_theta) * transmittance(cos_theta, roughness);
+}
+
 Rgb Body::inner_radiance_per_exitance(const Surface& surface) const {
     const float average = transmittance_average(surface.covering.roughness);
     return eval_color(material->tint, surface.texture_point) * surface.covering.tint *
@@ -34,7 +54,8 @@ Rgb Body::inner_radiance_per_exitance(const Surface& surface) const {
 }
 
 Rgb Body::radiance_per_exitance(const Surface& surface, const V3f& wo) const {
-    return inner_radiance_per_exitance(surface) * transmittance(surface.normal.dot(wo), surface.covering.roughness);
+    const float cosine = surface.normal.dot(wo);
+    return inner_radiance_per_exitance(surface) * enters(cosine, surface.covering.roughness);
 }
 
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
@@ -43,6 +64,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     struct Shared {
         std::optional<Profile> profile;
         std::shared_ptr<const TreeKernel> kernel, plain_kernel;
+        std::shared_ptr<const std::array<DirectionalAlbedo, 3>> by_angle;
     };
     std::map<std::tuple<const IceMaterial*, bool, float>, Shared> shared;     // by mean density
     std::map<std::pair<const IceMaterial*, std::uint32_t>, float> densities;  // by mesh
@@ -68,18 +90,20 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             is_traced = found->second;
         }
         const double traced = is_traced ? material->volume : 0.0;
-        auto& [profile, kernel, plain_kernel] = shared[{material, is_traced, mean}];
+        auto& [profile, kernel, plain_kernel, by_angle] = shared[{material, is_traced, mean}];
         if (!profile) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
+            by_angle = directional_albedos(medium);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
         bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
+        bodies[i]->by_angle = by_angle;
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
         for (int c = 0; c < 3; ++c) {
-            const double alpha = medium.sigma_s_prime[c] / (double(medium.sigma_s_prime[c]) + medium.sigma_a[c]);
+            const double alpha = single_albedo(medium, c);
             bodies[i]->traced_once[c] = static_cast<float>(traced * half_space_albedo(alpha, medium.eta).single);
         }
     }

@@ -5,6 +5,7 @@
 // Not: light that diffuses from one body into another that it touches.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -20,6 +21,7 @@
 #include "frazil/render/scene.h"
 #include "frazil/render/shells.h"
 #include "frazil/render/surface.h"
+#include "frazil/translucency/half_space.h"
 #include "frazil/translucency/point_tree.h"
 
 namespace frazil {
@@ -42,6 +44,7 @@ struct Body {
     Profile profile;
     std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
     Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
+    std::shared_ptr<const std::array<DirectionalAlbedo, 3>> by_angle;
     // Trees stand where their points do: places are brought there by `to_points`.
     M44f to_points;
     std::shared_ptr<const PointTree> tree;       // none where the object has no surface; one for a translucency set
@@ -61,10 +64,16 @@ struct Body {
     // What the boundary lets in (and out) at this angle; its mean over all directions; for one user roughness.
     float transmittance(float cos_theta, float roughness) const;
     float transmittance_average(float roughness) const;
+    // How light that enters or leaves depends on the angle (cosine outside): the directional albedo of a half space of the
+    // core, over its mean.
+    Rgb angular_share(float cos_theta) const;
 
-    // Radiance over squared index, inside below the surface, per unit of exitance: what leaves before the boundary dims it.
+    // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
+    Rgb enters(float cos_theta, float roughness) const;
+    // Radiance over squared index, inside below the surface, per unit of exitance: what leaves before the boundary dims
+    // it, averaged over angles.
     Rgb inner_radiance_per_exitance(const Surface& surface) const;
-    // Radiance towards wo per unit of exitance: diffuse inside, then through the boundary, so that T/T_avg averages to one.
+    // Radiance towards wo per unit of exitance: as it leaves inside, then through the boundary, so that it averages to one.
     Rgb radiance_per_exitance(const Surface& surface, const V3f& wo) const;
 };
 

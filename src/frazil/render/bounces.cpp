@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
 
-// Rays that look around from all points together, at most, so that what they find fits in memory: 28 bytes each where
+// Rays that look around from all points together, at most, so that what they find fits in memory: 36 bytes each where
 // they meet ice.
 constexpr std::size_t kMostSightlines = std::size_t(1) << 27;
 
@@ -25,7 +25,7 @@ struct Sightline {
     std::uint32_t body;      // whose point is seen: a leader of translucency sets
     std::uint32_t sender;    // index into the points of its set
     Rgb weight;              // irradiance per exitance
-    float mirrored;          // irradiance per irradiance that enters there: what the surface reflects
+    Rgb mirrored;            // irradiance per irradiance that enters there: what the surface reflects
 };
 
 // All that an object's points see, batch after batch of points.
@@ -83,7 +83,7 @@ class IceFinder {
             const Body& body = *bodies_[hit.surface.placement];
             found.push_back({hit.point, static_cast<std::uint32_t>(leader), point,
                              body.radiance_per_exitance(surface, -hit.direction) * hit.weight,
-                             mirrored_radiance(body, surface, -hit.direction) * hit.weight});
+                             hit.weight * mirrored_radiance(body, surface, -hit.direction)});
         }
         found.shrink_to_fit();
         return found;
@@ -180,7 +180,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
                 sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
                 reflected(hits, radiance);
             },
-            [&](float cosine) { return bodies[i]->transmittance(cosine, bodies[i]->material->roughness.value); },
+            [&](float cosine) { return bodies[i]->enters(cosine, bodies[i]->material->roughness.value); },
             bake_options, progress);
         stats.bake_rays += last[i].rays;
         stats.dropped_samples += last[i].dropped_samples;

@@ -87,7 +87,7 @@ void PathTracer::trace(const FirstHit& first, float samples, const V3f& view_axi
     if (const int body = interiors_.filling(path.inside); body != InsideOf::kNone) {
         Surface camera;
         camera.position = first.ray.origin;
-        path.core = core_at(camera, body, true);
+        path.core = core_at(path, camera, body, true);
         path.core.is_primary = true;
         path.volume = bodies_[std::size_t(body)]->material->volume;
     }
@@ -188,7 +188,7 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
                 path.first_material = scene_.objects[surface.object].material;
             }
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
-            IceCore core = core_at(surface, static_cast<int>(surface.object), false);
+            IceCore core = core_at(path, surface, static_cast<int>(surface.object), false);
             core.is_primary = path.bounce == 0;
             add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
@@ -260,7 +260,7 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     }
     path.leave_from(surface.lifted, surface.geometric_normal, wi);
     if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
-        path.begin_piece(core_at(surface, filled, true), bodies_[std::size_t(filled)]->material->volume);
+        path.begin_piece(core_at(path, surface, filled, true), bodies_[std::size_t(filled)]->material->volume);
     }
     return true;
 }

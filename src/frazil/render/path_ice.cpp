@@ -29,12 +29,14 @@ float refraction_alpha(const IceMaterial& ice, const Surface& surface) {
 
 }  // namespace
 
-IceCore PathTracer::core_at(const Surface& surface, int body, bool from_inside) const {
+IceCore PathTracer::core_at(const Path& path, const Surface& surface, int body, bool from_inside) const {
+    const Body& ice = *bodies_[std::size_t(body)];
     IceCore core;
     core.body = body;
     core.position = surface.position;
     core.normal = from_inside ? -surface.geometric_normal : surface.geometric_normal;
-    core.radiance_per_exitance = bodies_[std::size_t(body)]->inner_radiance_per_exitance(surface);
+    core.radiance_per_exitance = ice.inner_radiance_per_exitance(surface);
+    if (!from_inside) core.radiance_per_exitance *= ice.angular_share(std::abs(surface.normal.dot(path.ray.direction)));
     return core;
 }
 
@@ -112,18 +114,18 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
         path.inside = crossing.beyond;
         path.ray.origin = offset_origin(surface.position, -surface.geometric_normal);
         ++path.straight;
-        if (crossing.to != InsideOf::kNone) path.core = core_at(surface, crossing.to, false);
+        if (crossing.to != InsideOf::kNone) path.core = core_at(path, surface, crossing.to, false);
         return true;
     }
     if (path.inner >= kMaxInnerBounces) {
-        request_gather(path, core_at(surface, crossing.from, true), Rgb(1.0f), tile);
+        request_gather(path, core_at(path, surface, crossing.from, true), Rgb(1.0f), tile);
         return false;
     }
     if (path.inner >= kInnerBouncesBeforeRoulette && !path.survives(kInnerChance)) return false;
     ++path.inner;
     // What lies on the boundary is seen from below as the core sees it.
     if (const float covered = surface.covering.covered; covered > kHiding) {
-        request_gather(path, core_at(surface, crossing.from, true), Rgb(covered), tile);
+        request_gather(path, core_at(path, surface, crossing.from, true), Rgb(covered), tile);
         path.scale(Rgb(1.0f - covered));
         if (covered >= 1.0f) return false;
     }
@@ -156,7 +158,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     path.spread += lobe_spread(alpha);
     path.add_blur(alpha);
     if (body != InsideOf::kNone) {
-        path.begin_piece(core_at(surface, body, body == crossing.from), bodies_[std::size_t(body)]->material->volume);
+        path.begin_piece(core_at(path, surface, body, body == crossing.from), bodies_[std::size_t(body)]->material->volume);
     }
     return true;
 }

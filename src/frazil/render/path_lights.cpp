@@ -192,9 +192,9 @@ void PathTracer::add_entering_light(IceCore& core, const Path& path, const Surfa
                      sample.distance * (1.0f - 1e-4f)};
     if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
     const Light& light = lights_.lights()[std::size_t(sample.light)];
-    const float entering = body.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
-    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) *
-                    (multiplier(light, LightComponent::translucency) * entering * cosine / sample.pdf);
+    const Rgb entering = body.enters(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
+    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) * entering *
+                    (multiplier(light, LightComponent::translucency) * cosine / sample.pdf);
     core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);
 }
 

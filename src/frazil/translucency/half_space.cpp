@@ -1,5 +1,6 @@
 #include "frazil/translucency/half_space.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -52,60 +53,95 @@ std::vector<double> h_function(double alpha, const Nodes& nodes) {
     return h;
 }
 
-double uncollided_fraction(double mu) {
-    return mu > 0.0 ? 0.5 * (1.0 + mu * std::log1p(1.0 / mu)) : 0.5;
+// Light in a half space under a uniform sky of radiance 1, by the nodes of cosines inside.
+struct SkyLight {
+    Nodes nodes;
+    std::vector<double> h, reflected;  // H; what the boundary reflects from inside
+    std::vector<double> entered, inward;  // radiance that entered, and all that goes in: with what was reflected inside
+    double entered_flux = 0.0;
+
+    double flux(const std::vector<double>& radiance) const {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < radiance.size(); ++i) {
+            sum += nodes.weight[i] * nodes.mu[i] * (1.0 - reflected[i]) * radiance[i];
+        }
+        return sum;
+    }
+};
+
+// Radiance that is scattered from `from` towards mu, where H is h_mu; H is 1 all over for one scattering.
+double scattered(double alpha, double mu, double h_mu, const Nodes& nodes, const std::vector<double>& h,
+                 const std::vector<double>& from) {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < h.size(); ++j) {
+        sum += nodes.weight[j] * h[j] * nodes.mu[j] / (mu + nodes.mu[j]) * from[j];
+    }
+    return 0.5 * alpha * h_mu * sum;
+}
+
+// Scatter, reflect inside, scatter again, until nothing changes.
+SkyLight sky_light(double alpha, double eta) {
+    SkyLight sky;
+    sky.nodes = cosine_nodes(std::sqrt(1.0 - 1.0 / (eta * eta)));
+    const std::vector<double>& mu = sky.nodes.mu;
+    const std::size_t n = mu.size();
+    sky.h = h_function(alpha, sky.nodes);
+    sky.reflected.assign(n, 0.0);
+    for (std::size_t i = 0; i < n && eta != 1.0; ++i) {
+        sky.reflected[i] = fresnel_dielectric(static_cast<float>(mu[i]), static_cast<float>(1.0 / eta));
+    }
+    for (const double r : sky.reflected) sky.entered.push_back(1.0 - r);
+    sky.inward = sky.entered;
+    sky.entered_flux = sky.flux(std::vector<double>(n, 1.0));
+    double before = 0.0;
+    for (int step = 0; step < 2000; ++step) {
+        std::vector<double> outward(n);
+        for (std::size_t i = 0; i < n; ++i) outward[i] = scattered(alpha, mu[i], sky.h[i], sky.nodes, sky.h, sky.inward);
+        for (std::size_t i = 0; i < n; ++i) sky.inward[i] = sky.entered[i] + sky.reflected[i] * outward[i];
+        const double all = sky.flux(outward);
+        if (std::abs(all - before) < 1e-10 * sky.entered_flux) break;
+        before = all;
+    }
+    return sky;
 }
 
 }  // namespace
 
 HalfSpaceAlbedo half_space_albedo(double alpha, double eta) {
     if (alpha == 0.0) return {0.0, 0.0};
-    const Nodes nodes = cosine_nodes(std::sqrt(1.0 - 1.0 / (eta * eta)));
-    const std::size_t n = nodes.mu.size();
-    const std::vector<double> h = h_function(alpha, nodes);
-    // Radiance that enters from a uniform sky, per cosine inside, and the boundary's reflection from inside.
-    std::vector<double> reflected(n), entered(n), inward, outward(n), straight(n);
-    double entered_flux = 0.0;
+    const SkyLight sky = sky_light(alpha, eta);
+    const std::size_t n = sky.h.size();
+    const std::vector<double> ones(n, 1.0);
+    std::vector<double> once(n), all(n);
     for (std::size_t i = 0; i < n; ++i) {
-        reflected[i] =
-            eta == 1.0 ? 0.0 : fresnel_dielectric(static_cast<float>(nodes.mu[i]), static_cast<float>(1.0 / eta));
-        entered[i] = 1.0 - reflected[i];
-        entered_flux += nodes.weight[i] * nodes.mu[i] * entered[i];
+        const double mu = sky.nodes.mu[i];
+        once[i] = scattered(alpha, mu, 1.0, sky.nodes, ones, sky.entered);
+        all[i] = scattered(alpha, mu, sky.h[i], sky.nodes, sky.h, sky.inward);
     }
-    const auto scatter = [&](const std::vector<double>& from, bool is_single, std::vector<double>& to) {
-        for (std::size_t i = 0; i < n; ++i) {
-            double sum = 0.0;
-            for (std::size_t j = 0; j < n; ++j) {
-                const double orders = is_single ? 1.0 : h[i] * h[j];
-                sum += nodes.weight[j] * orders * nodes.mu[j] / (nodes.mu[i] + nodes.mu[j]) * from[j];
-            }
-            to[i] = 0.5 * alpha * sum;
-        }
-    };
-    const auto leaving = [&](const std::vector<double>& radiance) {
-        double flux = 0.0;
-        for (std::size_t i = 0; i < n; ++i) flux += nodes.weight[i] * nodes.mu[i] * (1.0 - reflected[i]) * radiance[i];
-        return flux / entered_flux;
-    };
-    scatter(entered, true, straight);
-    // Scatter, reflect inside, scatter again, until nothing changes.
-    inward = entered;
-    double all = 0.0;
-    for (int step = 0; step < 2000; ++step) {
-        scatter(inward, false, outward);
-        const double before = all;
-        all = leaving(outward);
-        for (std::size_t i = 0; i < n; ++i) inward[i] = entered[i] + reflected[i] * outward[i];
-        if (std::abs(all - before) < 1e-10) break;
-    }
-    const double single = leaving(straight);
-    return {single, all - single};
+    const double single = sky.flux(once) / sky.entered_flux;
+    return {single, sky.flux(all) / sky.entered_flux - single};
 }
 
-float multiple_scattering_angle(float mu) {
-    static const double mean =
-        integrate_gauss32([](double s) { return 4.0 * s * s * s * uncollided_fraction(s * s); }, 0.0, 1.0);
-    return static_cast<float>(uncollided_fraction(mu) / mean);
+DirectionalAlbedo::DirectionalAlbedo(double alpha, double eta) {
+    values_.fill(1.0f);
+    if (alpha == 0.0) return;
+    const SkyLight sky = sky_light(alpha, eta);
+    const std::vector<double> ones(sky.h.size(), 1.0);
+    const double mean = half_space_albedo(alpha, eta).all();
+    for (int i = 0; i <= kSteps; ++i) {
+        const double root = double(i) / kSteps, mu = root * root;
+        // H(mu) from H at the nodes.
+        const double h = 1.0 / (std::sqrt(1.0 - alpha) + scattered(alpha, mu, 1.0, sky.nodes, sky.h, ones));
+        values_[std::size_t(i)] =
+            static_cast<float>(scattered(alpha, mu, h, sky.nodes, sky.h, sky.inward) / mean);
+    }
+}
+
+float DirectionalAlbedo::operator()(float mu) const {
+    const float x = std::sqrt(std::clamp(mu, 0.0f, 1.0f)) * kSteps;
+    const int i = std::min(static_cast<int>(x), kSteps - 1);
+    const float f = x - static_cast<float>(i);
+    return values_[std::size_t(i)] * (1.0f - f) + values_[std::size_t(i) + 1] * f;
 }
 
 }  // namespace frazil

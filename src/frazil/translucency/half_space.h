@@ -6,6 +6,8 @@
 // Not: where light leaves (profile.h), anisotropic scattering.
 #pragma once
 
+#include <array>
+
 namespace frazil {
 
 struct HalfSpaceAlbedo {
@@ -17,9 +19,18 @@ struct HalfSpaceAlbedo {
 // For light from all around, cosine-distributed outside and refracted at the boundary.
 HalfSpaceAlbedo half_space_albedo(double alpha, double eta);
 
-// For an index-matched half space that absorbs nothing: the fraction of light in direction mu (cosine inside) that is not
-// lost to single scattering, over its mean: how multiple scattering depends on the angle of entry and of exit.
-// (1 + mu ln(1 + 1/mu))/2 over its mean by 2 mu dmu.
-float multiple_scattering_angle(float mu);
+// How much of the light that enters at an angle leaves again, over the mean of light from all around; by reciprocity also
+// how the radiance that leaves under light from all around depends on the angle. 1 where nothing is absorbed. Tabulated, 1e-3.
+class DirectionalAlbedo {
+  public:
+    DirectionalAlbedo() { values_.fill(1.0f); }
+    DirectionalAlbedo(double alpha, double eta);
+    // mu: the cosine inside, 0..1.
+    float operator()(float mu) const;
+
+  private:
+    static constexpr int kSteps = 64;  // in the root of mu
+    std::array<float, kSteps + 1> values_;
+};
 
 }  // namespace frazil
