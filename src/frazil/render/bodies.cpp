@@ -170,7 +170,7 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
     std::vector<Rgb> gains(count, Rgb(1.0f));
     for (std::size_t i = 0; i < count; ++i) {
         for (int c = 0; c < 3; ++c) {
-            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
+            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(getenv("FRAZIL_WALK") ? 0.0f : 1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
         }
     }
     return gains;

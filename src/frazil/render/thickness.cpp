@@ -12,24 +12,24 @@ namespace {
 constexpr int kChords = 16;
 constexpr std::uint32_t kSeed = 0x74686963U;
 
-// The mean length of cosine-distributed chords from a point inwards; infinite where one finds no other side.
-float mean_chord(const V3f& position, const V3f& normal, std::span<const V2f> u, const RayScene& scene,
-                 const Shells* shells, PlacementMask mask) {
+// The lengths of cosine-distributed chords from a point inwards; false where one finds no other side.
+bool find_chords(const V3f& position, const V3f& normal, std::span<const V2f> u, const RayScene& scene,
+                 const Shells* shells, PlacementMask mask, std::span<float> lengths) {
     const V3f inward = -normal, origin = offset_origin(position, inward);
     const auto [s, t] = tangent_frame(inward);
-    float sum = 0.0f;
+    std::size_t k = 0;
     for (const V2f& v : u) {
         const V3f local = cosine_hemisphere(v), direction = s * local.x + t * local.y + inward * local.z;
         Hit hit;
         if (shells) {
-            sum += shells->way_through({origin, direction});
+            lengths[k++] = shells->way_through({origin, direction});
         } else if (scene.intersect({origin, direction}, hit, mask)) {
-            sum += hit.t;
+            lengths[k++] = hit.t;
         } else {
-            return std::numeric_limits<float>::infinity();
+            return false;
         }
     }
-    return sum / static_cast<float>(u.size());
+    return true;
 }
 
 }  // namespace
@@ -46,15 +46,54 @@ std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, c
     const ScrambledNet net(kChords);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         std::vector<V2f> u(net.size());
+        std::vector<float> lengths(net.size());
         for (std::size_t k = begin; k < end; ++k) {
             net.draw(kSeed, static_cast<std::uint32_t>(k), u);
-            const float length = stretch * mean_chord(points.positions[k], points.normals[k], u, scene, shells, mask);
-            if (!std::isfinite(length)) continue;
+            if (!find_chords(points.positions[k], points.normals[k], u, scene, shells, mask, lengths)) continue;
+            if (getenv("FRAZIL_WALK")) {
+                const int walks = atoi(getenv("FRAZIL_WALK"));
+                for (int c = 0; c < 3; ++c) {
+                    Sampler random(kSeed, static_cast<std::uint32_t>(k), static_cast<std::uint32_t>(c));
+                    const float sigma_t = medium.sigma_s_prime[c] + medium.sigma_a[c], alpha = medium.sigma_s_prime[c] / sigma_t;
+                    const V3f inward = -points.normals[k];
+                    const auto [s, t] = tangent_frame(inward);
+                    double sum = 0.0;
+                    for (int w = 0; w < walks; ++w) {
+                        const V3f local = cosine_hemisphere(random.next_2d());
+                        V3f d = s * local.x + t * local.y + inward * local.z, o = offset_origin(points.positions[k], inward);
+                        float weight = 1.0f;
+                        for (int step = 0; step < 3000; ++step) {
+                            const float free = -std::log1p(-random.next_1d()) / sigma_t;
+                            Ray ray{o, d};
+                            ray.t_max = free;
+                            Hit hit;
+                            if (scene.intersect(ray, hit, mask)) { if (step || !getenv("FRAZIL_CLEAR")) sum += weight; break; }
+                            o = o + d * free;
+                            weight *= alpha;
+                            if (weight < 0.1f) { if (random.next_1d() < 0.5f) break; weight *= 2.0f; }
+                            const V2f u = random.next_2d();
+                            const float z = 1.0f - 2.0f * u.x, r = std::sqrt(std::max(0.0f, 1.0f - z * z)), phi = 2.0f * kPi * u.y;
+                            d = V3f(r * std::cos(phi), r * std::sin(phi), z);
+                        }
+                    }
+                    float clear = 0.0f;
+                    if (getenv("FRAZIL_CLEAR")) for (const float l : lengths) clear += std::exp(-medium.sigma_s_prime[c] * l) / float(lengths.size());
+                    gain[k][c] = static_cast<float>(sum / walks) / (returned[c] * (1.0f - clear));
+                }
+                continue;
+            }
             for (int c = 0; c < 3; ++c) {
                 const float most = 1.0f - returned[c], plane = returned[c] - traced_once[c];
                 if (!(most > 0.0f && plane > 0.0f)) continue;
-                const float absorbed = -most * std::expm1(-medium.sigma_a[c] * length / most);
-                gain[k][c] = (1.0f - absorbed - traced_once[c]) / plane;
+                float absorbed = 0.0f;
+                for (const float length : lengths) absorbed -= std::expm1(-medium.sigma_a[c] * stretch * length / most);
+                absorbed *= most / static_cast<float>(lengths.size());
+                float clear = 0.0f, straight = 0.0f;
+                if (getenv("FRAZIL_CLEAR")) for (const float l : lengths) {
+                    clear += std::exp(-medium.sigma_s_prime[c] * l) / float(lengths.size());
+                    straight += std::exp(-(medium.sigma_a[c] + medium.sigma_s_prime[c]) * l) / float(lengths.size());
+                }
+                gain[k][c] = ((1.0f - absorbed - straight) / (1.0f - clear) - traced_once[c]) / plane;
             }
         }
     });
