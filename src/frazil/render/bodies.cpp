@@ -43,6 +43,16 @@ Rgb Body::angular_share(float cos_theta) const {
     return {(*by_angle)[0](mu), (*by_angle)[1](mu), (*by_angle)[2](mu)};
 }
 
+V3f Body::drift(const V3f& direction, const V3f& normal) const {
+    const V3f along = (direction - normal * direction.dot(normal)) / medium.eta;
+    float length = 0.0f;
+    for (int c = 0; c < 3; ++c) {
+        length += (2.0f * (*by_angle)[c](1.0f) - 1.0f) / (3.0f * (medium.sigma_s_prime[c] + medium.sigma_a[c]));
+    }
+    if (getenv("FRAZIL_NODRIFT")) length = 0.0f;
+    return along * length;
+}
+
 Rgb Body::enters(float cos_theta, float roughness) const {
     return angular_share(cos_theta) * transmittance(cos_theta, roughness);
 }

@@ -67,6 +67,9 @@ struct Body {
     // How light that enters or leaves depends on the angle (cosine outside): the directional albedo of a half space of the
     // core, over its mean.
     Rgb angular_share(float cos_theta) const;
+    // The tangential part of the way to where light that comes along `direction` is scattered first, on the mean, weighted by
+    // what leaves again.
+    V3f drift(const V3f& direction, const V3f& normal) const;
 
     // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
     Rgb enters(float cos_theta, float roughness) const;

@@ -36,7 +36,10 @@ IceCore PathTracer::core_at(const Path& path, const Surface& surface, int body, 
     core.position = surface.position;
     core.normal = from_inside ? -surface.geometric_normal : surface.geometric_normal;
     core.radiance_per_exitance = ice.inner_radiance_per_exitance(surface);
-    if (!from_inside) core.radiance_per_exitance *= ice.angular_share(std::abs(surface.normal.dot(path.ray.direction)));
+    if (!from_inside) {
+        core.radiance_per_exitance *= ice.angular_share(std::abs(surface.normal.dot(path.ray.direction)));
+        core.drift = ice.drift(path.ray.direction, surface.normal);
+    }
     return core;
 }
 
@@ -95,6 +98,10 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
                             tile);
         }
     }
+    // The last scattering lies within the piece.
+    const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
+    const float depth = length * (extinction.x + extinction.y + extinction.z) / 3.0f;
+    if (depth < 20.0f) path.core.drift *= 1.0f - depth / std::max(std::expm1(depth), 1e-6f);
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
     path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
@@ -181,7 +188,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.object = static_cast<std::uint32_t>(core.body);
     request.pixel = path.pixel;
     request.subset = tile.subset;
-    request.position = core.position;
+    request.position = core.position + core.drift;
     request.normal = core.normal;
     request.is_primary = core.is_primary;
     request.samples = path.samples;

@@ -88,6 +88,10 @@ std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, c
                 float absorbed = 0.0f;
                 for (const float length : lengths) absorbed -= std::expm1(-medium.sigma_a[c] * stretch * length / most);
                 absorbed *= most / static_cast<float>(lengths.size());
+                if (getenv("FRAZIL_MEAN")) {
+                    float m = 0; for (const float length : lengths) m += length / float(lengths.size());
+                    absorbed = -most * std::expm1(-medium.sigma_a[c] * stretch * m / most);
+                }
                 float clear = 0.0f, straight = 0.0f;
                 if (getenv("FRAZIL_CLEAR")) for (const float l : lengths) {
                     clear += std::exp(-medium.sigma_s_prime[c] * l) / float(lengths.size());
