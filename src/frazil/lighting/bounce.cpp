@@ -23,6 +23,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     Irradiance result;
     result.groups = groups;
     result.values.assign(points.size() * groups, Rgb(0.0f));
+    if (options.with_flows) result.flows.assign(result.values.size(), Flow{});
     result.rays = std::uint64_t(points.size()) * std::uint64_t(options.samples);
     const ScrambledNet net(options.samples);
     std::atomic<std::uint64_t> dropped{0};
@@ -62,7 +63,11 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                     ++dropped;
                     continue;
                 }
-                result.values[hits[i].point * groups + g] += value;
+                const std::size_t row = hits[i].point * groups + g;
+                result.values[row] += value;
+                if (options.with_flows) {
+                    add_flow(result.flows[row], value, hits[i].direction, points.normals[hits[i].point]);
+                }
             }
         }
         const std::size_t finished = done += end - begin;

@@ -38,6 +38,7 @@ struct Workspace : BakeRays {
 struct Estimate {
     V3d sum = V3d(0.0);       // of the rounds' means
     V3d moment = V3d(0.0);    // of the rounds' covariances with the place
+    Flow flow{};              // of the rounds' means
     double variance = 0.0;    // of the luminance of `sum`
     double unoccluded = 0.0;  // sum of the rounds' absolute luminance were nothing in the way
     int rounds = 0;
@@ -64,13 +65,15 @@ void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& ta
     V3d sum(0.0), moment(0.0);
     double unoccluded = 0.0;
     const V3f& about = work.places.front().position;
+    Flow flow{};
     for (std::size_t i = 0; i < work.rays.size(); ++i) {
         unoccluded += absolute_luminance(work.values[i]);
         if (work.factors[i] == Rgb(0.0f)) continue;
         const Rgb value = work.values[i] * work.factors[i];
         sum += V3d(value);
-        moment += V3d(work.places[work.place_of[work.sample_of[i]]].position - about) *
-                  (double(value.x) + double(value.y) + double(value.z));
+        const Place& place = work.places[work.place_of[work.sample_of[i]]];
+        moment += V3d(place.position - about) * (double(value.x) + double(value.y) + double(value.z));
+        add_flow(flow, value, work.rays[i].direction, place.normal);
         work.arriving[work.sample_of[i]] = luminance(value);
     }
     // Two samples that follow one another lie in neighbouring strata: their difference tells the variance within.
@@ -87,6 +90,7 @@ void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& ta
         estimate.moment += (moment - mean * ((sum.x + sum.y + sum.z) / n)) / n;
     }
     estimate.sum += sum / n;
+    for (std::size_t c = 0; c < 3; ++c) estimate.flow[c] += flow[c] / float(n);
     estimate.variance += squares / (n * n);
     estimate.unoccluded += unoccluded / n;
     ++estimate.rounds;
@@ -95,7 +99,7 @@ void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& ta
 // Trace one point's rays, more rounds where the error asks for it, and write its irradiance. The standard deviation.
 float serve_point(std::uint32_t point, const RayScene& scene, const LightSampler& lights, const RayMaker& maker,
                   const std::vector<BakeTask>& tasks, const IrradianceOptions& options, Workspace& work,
-                  std::span<Rgb> values, std::span<V3f> moments) {
+                  std::span<Rgb> values, std::span<V3f> moments, std::span<Flow> flows) {
     std::vector<Estimate> estimates(tasks.size());
     maker.find_places(point, work);
     const auto add_round = [&](std::size_t t) {
@@ -126,6 +130,10 @@ float serve_point(std::uint32_t point, const RayScene& scene, const LightSampler
         values[tasks[t].group] += estimates[t].mean() * tasks[t].multiplier;
         if (!moments.empty()) {
             moments[tasks[t].group] += V3f(estimates[t].moment * (double(tasks[t].multiplier) / estimates[t].rounds));
+        }
+        const float scale = tasks[t].multiplier / float(estimates[t].rounds);
+        for (std::size_t c = 0; c < 3 && !flows.empty(); ++c) {
+            flows[tasks[t].group][c] += estimates[t].flow[c] * scale;
         }
         variance += double(tasks[t].multiplier) * double(tasks[t].multiplier) * estimates[t].mean_variance();
     }
@@ -177,6 +185,7 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
     result.values.assign(points.size() * groups.size(), Rgb(0.0f));
     result.errors.assign(points.size(), 0.0f);
     if (options.cells.cells) result.moments.assign(result.values.size(), V3f(0.0f));
+    if (options.with_flows) result.flows.assign(result.values.size(), Flow{});
 
     const std::vector<BakeTask> tasks = bake_tasks(lights, groups, options.component);
     if (tasks.empty() || points.size() == 0) return result;
@@ -192,8 +201,10 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
             const std::size_t row = std::size_t(order[i]) * groups.size();
             std::span<V3f> moments;
             if (!result.moments.empty()) moments = std::span(result.moments).subspan(row, groups.size());
+            std::span<Flow> flows;
+            if (!result.flows.empty()) flows = std::span(result.flows).subspan(row, groups.size());
             result.errors[order[i]] = serve_point(order[i], scene, lights, maker, tasks, options, work,
-                                                  std::span(result.values).subspan(row, groups.size()), moments);
+                                                  std::span(result.values).subspan(row, groups.size()), moments, flows);
         }
         rays += work.traced;
         dropped += work.dropped;

@@ -24,6 +24,18 @@
 
 namespace frazil {
 
+// Per channel: irradiance times the part along the surface of the direction in which that light travels, W/m².
+struct Flow {
+    V3f channel[3] = {V3f(0.0f), V3f(0.0f), V3f(0.0f)};
+    V3f& operator[](std::size_t c) { return channel[c]; }
+    const V3f& operator[](std::size_t c) const { return channel[c]; }
+};
+
+inline void add_flow(Flow& flow, const Rgb& irradiance, const V3f& towards_light, const V3f& normal) {
+    const V3f along = normal * towards_light.dot(normal) - towards_light;
+    for (int c = 0; c < 3; ++c) flow[static_cast<std::size_t>(c)] += along * irradiance[c];
+}
+
 // The fraction of light that enters at an angle whose cosine is this, per channel.
 using Transmittance = std::function<Rgb(float cosine)>;
 
@@ -40,6 +52,7 @@ struct IrradianceOptions {
     // Where rays start: spread over the cell of each point, so that irradiance is a mean over what the point stands for; or,
     // without, at the points themselves.
     CellSource cells = {};
+    bool with_flows = false;
 };
 
 // So many lights of a group are served one by one in the bake.
@@ -51,6 +64,7 @@ struct Irradiance {
     // (N, groups), with cells: covariance of irradiance, summed over channels, with the place in the cell; W/m. Divided by
     // the irradiance it is how far the centre of the light lies from the cell's centroid.
     std::vector<V3f> moments;
+    std::vector<Flow> flows;    // (N, groups), where asked for
     std::vector<float> errors;  // (N), one standard deviation of the luminance of all groups together, estimated
     std::uint64_t rays = 0;
     std::uint64_t dropped_samples = 0;  // non-finite

@@ -11,6 +11,7 @@
 #include "frazil/points/pose.h"
 #include "frazil/points/sampled_spacing.h"
 #include "frazil/render/bounces.h"
+#include "frazil/render/drift.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -226,6 +227,7 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         IrradianceOptions bake_options{options.bake_samples, options.seed};
         bake_options.objects = {static_cast<std::uint32_t>(i)};
         bake_options.error = options.bake_error;
+        bake_options.with_flows = true;
         const PointSet in_world = lit[i].points.in_world();
         Mesh mesh;
         std::shared_ptr<const Cells> cells;
@@ -250,8 +252,15 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         keep_entering(resolver.entering(static_cast<std::uint32_t>(i), in_world), irradiance);
         lit[i].irradiance = std::move(irradiance.values);
         lit[i].moments = std::move(irradiance.moments);
+        lit[i].flows = std::move(irradiance.flows);
     }
     add_bounces(scene, ray_scene, lights, options, bodies, lit, stats, progress);
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+        if (lit[i].points.size() == 0) continue;
+        Stopwatch watch(stats.seconds["bake"]);
+        carry_on(lit[i].points.in_world(), lit[i].flows, bodies[i]->drift_length(), lit[i].irradiance);
+        lit[i].flows = {};
+    }
     std::vector<EnteringLight> result(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
         result[i] = {std::move(lit[i].irradiance), std::move(lit[i].moments)};

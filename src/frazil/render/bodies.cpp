@@ -44,13 +44,12 @@ Rgb Body::angular_share(float cos_theta) const {
 }
 
 V3f Body::drift(const V3f& direction, const V3f& normal) const {
-    const V3f along = (direction - normal * direction.dot(normal)) / medium.eta;
-    float length = 0.0f;
-    for (int c = 0; c < 3; ++c) {
-        length += (2.0f * (*by_angle)[c](1.0f) - 1.0f) / (3.0f * (medium.sigma_s_prime[c] + medium.sigma_a[c]));
-    }
-    if (getenv("FRAZIL_NODRIFT")) length = 0.0f;
-    return along * length;
+    const Rgb length = drift_length();
+    return (direction - normal * direction.dot(normal)) * ((length.x + length.y + length.z) / 3.0f);
+}
+
+Rgb Body::drift_length() const {
+    return (angular_share(1.0f) * 2.0f - Rgb(1.0f)) / ((medium.sigma_s_prime + medium.sigma_a) * medium.eta);
 }
 
 Rgb Body::enters(float cos_theta, float roughness) const {

@@ -70,6 +70,8 @@ struct Body {
     // The tangential part of the way to where light that comes along `direction` is scattered first, on the mean, weighted by
     // what leaves again.
     V3f drift(const V3f& direction, const V3f& normal) const;
+    // The length of that way per channel, where light comes along the surface.
+    Rgb drift_length() const;
 
     // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
     Rgb enters(float cos_theta, float roughness) const;
@@ -85,6 +87,7 @@ struct LitPoints {
     PlacedPoints points;
     std::vector<Rgb> irradiance;    // (N, groups)
     std::vector<V3f> moments = {};  // (N, groups), as in Irradiance; empty where light was baked at the points alone
+    std::vector<Flow> flows = {};   // (N, groups), while light is baked
 };
 
 // The mesh of an object where its points' cloud is.

@@ -97,15 +97,19 @@ class IceFinder {
 };
 
 // Light along all sightlines of an object: what the points that are seen send.
-void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, Irradiance& light) {
+void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, const std::vector<PointSet>& seen,
+               const PointSet& points, Irradiance& light) {
     parallel_for(sightlines.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t batch = begin; batch < end; ++batch) {
             for (const Sightline& line : sightlines[batch]) {
                 const Exchange& body = bodies[line.body];
                 const std::size_t from = line.sender * light.groups, to = line.receiver * light.groups;
+                const V3f direction =
+                    (seen[line.body].positions[line.sender] - points.positions[line.receiver]).normalized();
                 for (std::size_t g = 0; g < light.groups; ++g) {
-                    light.values[to + g] +=
-                        body.exitance[from + g] * line.weight + body.entering[from + g] * line.mirrored;
+                    const Rgb value = body.exitance[from + g] * line.weight + body.entering[from + g] * line.mirrored;
+                    light.values[to + g] += value;
+                    add_flow(light.flows[to + g], value, direction, points.normals[line.receiver]);
                 }
             }
         }
@@ -130,6 +134,8 @@ void keep_entering(const std::vector<float>& entering, Irradiance& irradiance) {
     for (std::size_t k = 0; k < irradiance.values.size(); ++k) {
         irradiance.values[k] *= entering[k / irradiance.groups];
         if (!irradiance.moments.empty()) irradiance.moments[k] *= entering[k / irradiance.groups];
+        if (irradiance.flows.empty()) continue;
+        for (V3f& flow : irradiance.flows[k].channel) flow *= entering[k / irradiance.groups];
     }
 }
 
@@ -161,10 +167,12 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     std::vector<Sightlines> sightlines(lit.size());
     std::vector<Irradiance> last(lit.size());  // what the last bounce brought; at first what surfaces reflect
     std::vector<std::vector<float>> entering(lit.size());
+    std::vector<PointSet> in_world(lit.size()), seen(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
-        const PointSet in_world = lit[i].points.in_world();
-        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world);
+        in_world[i] = lit[i].points.in_world();
+        if (sets.is_leader(i)) seen[i] = sets.points(i).in_world();
+        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world[i]);
         IrradianceOptions bake_options{rays, options.seed};
         Mesh mesh;
         const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
@@ -173,8 +181,9 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             bake_options.cells = {cells.get(), &mesh};
         }
         sightlines[i].resize((lit[i].points.size() + kPointsPerBounceBatch - 1) / kPointsPerBounceBatch);
+        bake_options.with_flows = true;
         last[i] = bake_bounce(
-            in_world, ray_scene, groups,
+            in_world[i], ray_scene, groups,
             [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                 if (hits.empty()) return;
                 sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
@@ -197,10 +206,16 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         }
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;
-            if (bounce > 0) std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
-            add_light(sightlines[i], exchange, last[i]);
+            if (bounce > 0) {
+                std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
+                std::fill(last[i].flows.begin(), last[i].flows.end(), Flow{});
+            }
+            add_light(sightlines[i], exchange, seen, in_world[i], last[i]);
             keep_entering(entering[i], last[i]);
-            for (std::size_t k = 0; k < last[i].values.size(); ++k) lit[i].irradiance[k] += last[i].values[k];
+            for (std::size_t k = 0; k < last[i].values.size(); ++k) {
+                lit[i].irradiance[k] += last[i].values[k];
+                for (std::size_t c = 0; c < 3; ++c) lit[i].flows[k][c] += last[i].flows[k][c];
+            }
         }
         if (progress) progress->update("bounce", 1.0);  // rays took the time; asks whether to go on
     }

@@ -1,0 +1,23 @@
+// Light that enters at an angle is scattered first beside the place where it enters: where its flow along the surface
+// varies, light gathers or is lost. Profiles, which are round about that place, do not know.
+// Model: E' = E - div(l F): F the flow (lighting/irradiance.h), l the mean way along the surface to the first scattering,
+//   weighted by what leaves again: (1 + mu a'(mu)/a(mu)) sin/sigma_t, a the directional albedo, which is sin/sigma_t where
+//   nothing is absorbed; over all angles 2 a(1)/A - 1 of it. Each point hands its light on along the gradient of what
+//   its neighbours weigh there, by a kernel as wide as light drifts at most.
+// Units: metres, W/m2.
+// Valid: the sum of irradiance times area stays the same; linear in the light; light from all around, whose flow is zero,
+//   stays as it is. The same bits for any number of threads.
+// Not: the depth of the first scattering; parts thinner than a free path, where light passes on the other side.
+#pragma once
+
+#include <vector>
+
+#include "frazil/lighting/irradiance.h"
+#include "frazil/points/point_set.h"
+
+namespace frazil {
+
+// Carry the light of points on: irradiance and flows (N, groups), `length` metres per channel.
+void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length, std::vector<Rgb>& irradiance);
+
+}  // namespace frazil
