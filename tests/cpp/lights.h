@@ -28,8 +28,8 @@ inline PointSet one_point(const V3f& position, const V3f& normal) {
     return points;
 }
 
-inline float full(float) {
-    return 1.0f;
+inline Rgb full(float) {
+    return Rgb(1.0f);
 }
 
 // A square of half side s in the plane z = height, facing +z.

@@ -20,8 +20,8 @@ PointSet one_point(const V3f& position, const V3f& normal) {
     return points;
 }
 
-float full(float) {
-    return 1.0f;
+Rgb full(float) {
+    return Rgb(1.0f);
 }
 
 Light make_light(LightShape shape, const M44f& matrix = M44f()) {
@@ -240,7 +240,7 @@ TEST_CASE("irradiance: transmittance weighs the angle of entry") {
     options.samples = 1024;
     const LightSampler dome({make_light(DomeLight{})});
     const auto baked = bake_irradiance(
-        one_point(V3f(0.0f), V3f(0, 1, 0)), empty, dome, [](float c) { return c; }, options);
+        one_point(V3f(0.0f), V3f(0, 1, 0)), empty, dome, [](float c) { return Rgb(c); }, options);
     CHECK(baked.values[0].x == doctest::Approx(2 * kPiD / 3).epsilon(1e-4));
 }
 
@@ -392,7 +392,7 @@ TEST_CASE("bounce: walls of radiance 1 all around give pi, per group, and T weig
     REQUIRE(bounced.values.size() == 18);
     CHECK(bounced.values[8].x == doctest::Approx(kPiD).epsilon(1e-5));
     CHECK(bounced.values[9].x == doctest::Approx(-3 * kPiD).epsilon(1e-5));
-    const auto weighed = bake_bounce(points, scene, 2, walls, [](float c) { return c; }, {1024});
+    const auto weighed = bake_bounce(points, scene, 2, walls, [](float c) { return Rgb(c); }, {1024});
     CHECK(weighed.values[0].x == doctest::Approx(2 * kPiD / 3).epsilon(1e-3));
     CHECK_THROWS_WITH_AS(bake_bounce(points, scene, 1, walls, full, {0}), doctest::Contains("samples"), ValueError);
 }

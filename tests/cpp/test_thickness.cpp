@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "frazil/base/quadrature.h"
 #include "frazil/render/thickness.h"
 #include "frazil/translucency/half_space.h"
 #include "shapes.h"
@@ -64,7 +65,7 @@ TEST_CASE("thickness: chords of a closed body end at its own other side, whateve
     const std::vector<std::uint8_t> itself = {1, 0};
     const auto mean = [&](PlacementMask mask) {
         Rgb sum(0.0f);
-        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), nullptr, mask)) sum += gain / 64.0f;
+        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 0.0f, nullptr, mask)) sum += gain / 64.0f;
         return sum;
     };
     CHECK(mean(&itself) == mean_gain(slab(0.1f), medium));
@@ -101,6 +102,24 @@ TEST_CASE("thickness: light of one scattering that rays trace is in neither side
     for (int c = 0; c < 3; ++c) {
         const float plane = static_cast<float>(half_space_albedo(50.0 / (50.0 + medium.sigma_a[c]), 1.0).all());
         CHECK(less[c] * (plane - once[c]) == doctest::Approx(all[c] * plane - once[c]).epsilon(1e-4));
+    }
+}
+
+TEST_CASE("thickness: what is seen straight through is not the core's, which keeps a white slab white") {
+    const float thickness = 0.02f;
+    const Medium medium{Rgb(50.0f), Rgb(0.0f, 5.0f, 25.0f), 1.0f};
+    const RayScene scene({slab(thickness)}, {Placement{}});
+    Rgb all(0.0f), core(0.0f);
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f))) all += gain / 64.0f;
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 1.0f)) core += gain / 64.0f;
+    CHECK(core.x == doctest::Approx(1.0f).epsilon(1e-4));
+    const auto straight = [&](double sigma) {  // 2 E3(sigma thickness): what crosses the slab unscattered
+        return integrate_gauss32([&](double mu) { return 2.0 * mu * std::exp(-sigma * thickness / mu); }, 0.0, 1.0);
+    };
+    for (int c = 1; c < 3; ++c) {
+        const double sigma_a = medium.sigma_a[c], plane = half_space_albedo(50.0 / (50.0 + sigma_a), 1.0).all();
+        const double left = (all[c] * plane - straight(50.0 + sigma_a)) / (1.0 - straight(50.0));
+        CHECK(core[c] * plane == doctest::Approx(left).epsilon(0.01));
     }
 }
 

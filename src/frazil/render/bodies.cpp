@@ -48,6 +48,13 @@ V3f Body::drift(const V3f& direction, const V3f& normal) const {
     return (direction - normal * direction.dot(normal)) * ((length.x + length.y + length.z) / 3.0f);
 }
 
+float Body::drift_within(float length) const {
+    const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
+    const float depth = length * (extinction.x + extinction.y + extinction.z) / 3.0f;
+    if (!(depth > 1e-4f)) return 0.0f;
+    return depth < 50.0f ? 1.0f - depth / std::expm1(depth) : 1.0f;
+}
+
 Rgb Body::drift_length() const {
     return (angular_share(1.0f) * 2.0f - Rgb(1.0f)) / ((medium.sigma_s_prime + medium.sigma_a) * medium.eta);
 }
@@ -103,7 +110,9 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         if (!profile) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
-            by_angle = directional_albedos(medium);
+            const bool lacks_single = traced > 0.0 && lacks_single_scattering(material->profile);
+            by_angle = lacks_single ? std::make_shared<const std::array<DirectionalAlbedo, 3>>()
+                                    : directional_albedos(medium);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
         bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
@@ -132,7 +141,10 @@ std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shar
 }
 
 bool ThicknessTrees::is_shared(std::size_t leader) {
-    if (sets_.shells(leader)) return false;
+    return !sets_.shells(leader) && is_closed_body(leader);
+}
+
+bool ThicknessTrees::is_closed_body(std::size_t leader) {
     const auto [found, is_new] = is_closed_.try_emplace(scene_.objects[leader].mesh, false);
     if (is_new) found->second = is_closed(scene_.meshes[scene_.objects[leader].mesh]);
     return found->second;
@@ -142,12 +154,14 @@ std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     const PlacedPoints& points = sets_.points(leader);
     if (points.size() == 0) return nullptr;
     const Body& body = *bodies_[leader];
+    const float seen_through = is_closed_body(leader) ? body.material->refraction : 0.0f;
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
     const auto make = [&](PlacementMask mask) {
         return make_tree(
             points, body.plain_kernel,
-            thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, sets_.shells(leader), mask),
+            thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, seen_through,
+                           sets_.shells(leader), mask),
             1);
     };
     if (!is_shared(leader)) return make(nullptr);
@@ -179,7 +193,7 @@ std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* position
     std::vector<Rgb> gains(count, Rgb(1.0f));
     for (std::size_t i = 0; i < count; ++i) {
         for (int c = 0; c < 3; ++c) {
-            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(getenv("FRAZIL_WALK") ? 0.0f : 1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
+            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
         }
     }
     return gains;

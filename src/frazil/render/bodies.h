@@ -72,6 +72,8 @@ struct Body {
     V3f drift(const V3f& direction, const V3f& normal) const;
     // The length of that way per channel, where light comes along the surface.
     Rgb drift_length() const;
+    // What is left of the way where light that is not scattered leaves the body after `length` metres.
+    float drift_within(float length) const;
 
     // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
     Rgb enters(float cos_theta, float roughness) const;
@@ -115,6 +117,7 @@ class ThicknessTrees {
 
   private:
     bool is_shared(std::size_t leader);
+    bool is_closed_body(std::size_t leader);
 
     const Scene& scene_;
     const RayScene& ray_scene_;

@@ -56,6 +56,8 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
     const float reach =
         std::clamp(kReach * max_component(length), kFewestSpacings * spacing, kMostSpacings * spacing);
     const Neighbourhoods neighbourhoods(points, reach);
+    Rgb way;  // no farther than the kernel can carry
+    for (int c = 0; c < 3; ++c) way[c] = std::clamp(length[c], 0.0f, reach / kReach);
     std::vector<Total> totals(n);
     parallel_for(n, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
@@ -78,7 +80,7 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
                 for (std::size_t g = 0; g < groups; ++g) {
                     const Flow& flow = flows[k * groups + g];
                     irradiance[j * groups + g] +=
-                        Rgb(flow[0].dot(slope), flow[1].dot(slope), flow[2].dot(slope)) * length;
+                        Rgb(flow[0].dot(slope), flow[1].dot(slope), flow[2].dot(slope)) * way;
                 }
             });
         }

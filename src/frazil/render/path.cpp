@@ -192,6 +192,7 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             core.is_primary = path.bounce == 0;
             add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
+                core.drift *= core.is_primary ? body->drift_within(chord_behind(surface, path.ray.direction, tile)) : 0.0f;
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {
                 *split = path;
@@ -216,6 +217,14 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
         if (!reflect(path, surface, shader, wo, reflection_odds)) return;
         split = nullptr;
     }
+}
+
+// How far a ray goes straight on behind a surface.
+float PathTracer::chord_behind(const Surface& surface, const V3f& direction, Tile& tile) const {
+    ++tile.rays;
+    Hit hit;
+    const bool is_hit = ray_scene_.intersect({offset_origin(surface.position, -surface.geometric_normal), direction}, hit);
+    return is_hit ? hit.t : std::numeric_limits<float>::infinity();
 }
 
 // What a surface itself gives: emission, where no mesh light stands for it.

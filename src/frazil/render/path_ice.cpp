@@ -98,10 +98,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
                             tile);
         }
     }
-    // The last scattering lies within the piece.
-    const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
-    const float depth = length * (extinction.x + extinction.y + extinction.z) / 3.0f;
-    if (depth < 20.0f) path.core.drift *= 1.0f - depth / std::max(std::expm1(depth), 1e-6f);
+    path.core.drift *= bodies_[std::size_t(body)]->drift_within(length);
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
     path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
