@@ -32,23 +32,52 @@ def torus() -> trimesh.Trimesh:
     return shape.apply_transform(trimesh.transformations.rotation_matrix(-0.8, (1, 0.2, 0)))
 
 
-# Shape, sigma_s_prime and sigma_a in 1/m. Albedo from 0.7 to 0.9999, bodies from 4 to 50 mean free paths across.
+def sphere() -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(subdivisions=5, radius=0.42)
+
+
+def turned_box(extents: tuple[float, float, float], about_y: float) -> trimesh.Trimesh:
+    tilt = trimesh.transformations.rotation_matrix(0.6, (1, 0.3, 0))
+    shape = trimesh.creation.box(extents).apply_transform(tilt)
+    return shape.apply_transform(trimesh.transformations.rotation_matrix(about_y, (0, 1, 0)))
+
+
+def cube() -> trimesh.Trimesh:
+    return turned_box((0.6, 0.6, 0.6), 0.7)
+
+
+def capsule() -> trimesh.Trimesh:
+    shape = trimesh.creation.capsule(0.8, 0.08).apply_translation((0, 0, -0.4))
+    return shape.apply_transform(trimesh.transformations.rotation_matrix(0.7, (0.3, 1, 0)))
+
+
+# A square lamp [centre, target, half size, radiance] and the radiance from all around.
+FRONT = ([[1.4, 1.8, 1.2], [0.0, 0.0, 0.0], 0.45, 12.0], 0.4)
+SIDE = ([[2.4, 0.3, -0.3], [0.0, 0.0, 0.0], 0.3, 30.0], 0.1)
+BACK = ([[-0.6, 1.2, -2.0], [0.0, 0.0, 0.0], 0.45, 16.0], 0.2)
+FAINT_BACK = (BACK[0], 0.1)
+
+# Shape, sigma_s_prime and sigma_a in 1/m, light. Albedo from 0.5 to 0.9999, bodies from 4 to 50 mean free paths across.
 SCENES = {
-    "torus": (torus, (20.0, 20.0, 20.0), (0.4, 0.1, 0.03)),
-    "slab": (slab, (25.0, 25.0, 25.0), (0.5, 0.1, 0.02)),
-    "blob": (blob, (30.0, 30.0, 30.0), (1.0, 0.3, 0.003)),
-    "blob_dark": (blob, (21.0, 24.0, 27.0), (9.0, 6.0, 3.0)),
-    "torus_clear": (torus, (5.0, 5.0, 5.0), (0.2, 0.05, 0.01)),
-    "blob_dense": (blob, (80.0, 80.0, 80.0), (0.8, 0.2, 0.04)),
+    "torus": (torus, (20.0, 20.0, 20.0), (0.4, 0.1, 0.03), FRONT),
+    "slab": (slab, (25.0, 25.0, 25.0), (0.5, 0.1, 0.02), FRONT),
+    "blob": (blob, (30.0, 30.0, 30.0), (1.0, 0.3, 0.003), FRONT),
+    "blob_dark": (blob, (21.0, 24.0, 27.0), (9.0, 6.0, 3.0), FRONT),
+    "torus_clear": (torus, (5.0, 5.0, 5.0), (0.2, 0.05, 0.01), FRONT),
+    "blob_dense": (blob, (80.0, 80.0, 80.0), (0.8, 0.2, 0.04), FRONT),
+    "sphere_dark": (sphere, (15.0, 21.0, 27.0), (15.0, 9.0, 3.0), FRONT),
+    "sphere_side": (sphere, (24.25, 24.75, 24.975), (0.75, 0.25, 0.025), SIDE),
+    "cube_dark": (cube, (15.0, 21.0, 27.0), (15.0, 9.0, 3.0), FRONT),
+    "cube_back": (cube, (19.0, 19.7, 19.98), (1.0, 0.3, 0.02), BACK),
+    "capsule_back": (capsule, (27.0, 29.1, 29.85), (3.0, 0.9, 0.15), FAINT_BACK),
 }
-ENV, LIGHT = 0.4, [[1.4, 1.8, 1.2], [0.0, 0.0, 0.0], 0.45, 12.0]
 CAMERA, FOV = [[0.3, 0.5, 2.4], [0.0, 0.0, 0.0]], 30.0
 
 
-def render(mi, ply: Path, scatter, absorb, size: int, samples: int, seed: int) -> np.ndarray:
+def render(mi, ply: Path, scatter, absorb, lit, size: int, samples: int, seed: int) -> np.ndarray:
     look = mi.ScalarTransform4f().look_at
     sigma_t = np.add(scatter, absorb)
-    centre, target, half, radiance = LIGHT
+    (centre, target, half, radiance), env = lit
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -67,7 +96,7 @@ def render(mi, ply: Path, scatter, absorb, size: int, samples: int, seed: int) -
                     "albedo": {"type": "rgb", "value": (np.array(scatter) / sigma_t).tolist()},
                 },
             },
-            "env": {"type": "constant", "radiance": {"type": "rgb", "value": [ENV] * 3}},
+            "env": {"type": "constant", "radiance": {"type": "rgb", "value": [env] * 3}},
             "light": {
                 "type": "rectangle",
                 "to_world": look(centre, target, [0, 1, 0]) @ mi.ScalarTransform4f().scale([half, half, 1]),
@@ -111,14 +140,14 @@ def main() -> None:
     mi.set_variant("scalar_rgb")
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in options.only:
-        make, scatter, absorb = SCENES[name]
+        make, scatter, absorb, lit = SCENES[name]
         shape, ply = make(), options.folder / f"{name}.ply"
         shape.export(ply)
         start = time.process_time()
-        halves = [render(mi, ply, scatter, absorb, options.size, options.samples // 2, seed) for seed in (1, 2)]
+        halves = [render(mi, ply, scatter, absorb, lit, options.size, options.samples // 2, seed) for seed in (1, 2)]
         seconds = time.process_time() - start
         params = {
-            "mesh": ply.name, "sigma_s_prime": scatter, "sigma_a": absorb, "env": [ENV] * 3, "light": LIGHT,
+            "mesh": ply.name, "sigma_s_prime": scatter, "sigma_a": absorb, "env": [lit[1]] * 3, "light": lit[0],
             "camera": CAMERA, "fov": FOV,
         }  # fmt: skip
         np.savez(

@@ -149,7 +149,7 @@ TEST_CASE("half space: the albedo by angle averages to one, and meets its limits
           doctest::Approx((1.0 - std::sqrt(0.5)) / half_space_albedo(0.5, 1.0).all()).epsilon(1e-3));
     const DirectionalAlbedo faint(1e-4, 1.0);
     for (const double mu : {0.1, 0.5, 1.0}) {
-        const double once = (1.0 - mu * std::log1p(1.0 / mu)) / (2.0 / 3.0 * (1.0 - std::log(2.0)));
+        const double once = (1.0 - mu * std::log1p(1.0 / mu)) / (4.0 / 3.0 * (1.0 - std::log(2.0)));
         CHECK(faint(float(mu)) == doctest::Approx(once).epsilon(2e-3));
     }
 }

@@ -65,7 +65,8 @@ TEST_CASE("thickness: chords of a closed body end at its own other side, whateve
     const std::vector<std::uint8_t> itself = {1, 0};
     const auto mean = [&](PlacementMask mask) {
         Rgb sum(0.0f);
-        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 0.0f, nullptr, mask)) sum += gain / 64.0f;
+        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 0.0f, nullptr, mask))
+            sum += gain / 64.0f;
         return sum;
     };
     CHECK(mean(&itself) == mean_gain(slab(0.1f), medium));

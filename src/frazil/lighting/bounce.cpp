@@ -49,7 +49,8 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.position = origin + hit.direction * hit.surface.t;
                 // Cosine-distributed rays leave pi T L / n.
-                hit.weight = transmittance(std::max(0.0f, hit.direction.dot(place.normal))) * (kPi / float(options.samples));
+                hit.weight =
+                    transmittance(std::max(0.0f, hit.direction.dot(place.normal))) * (kPi / float(options.samples));
                 hits.push_back(hit);
             }
         }

@@ -176,8 +176,7 @@ std::vector<std::string> light_groups(const std::vector<Light>& lights) {
 }
 
 Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const LightSampler& lights,
-                           const Transmittance& transmittance, const IrradianceOptions& options,
-                           Progress* progress) {
+                           const Transmittance& transmittance, const IrradianceOptions& options, Progress* progress) {
     check_bake(points, options);
     const std::vector<std::string> groups = light_groups(lights.lights());
     Irradiance result;

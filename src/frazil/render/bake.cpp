@@ -245,8 +245,7 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         }
         Irradiance irradiance = bake_irradiance(
             in_world, ray_scene, lights,
-            [&](float cosine) { return bodies[i]->enters(cosine, material.roughness.value); }, bake_options,
-            progress);
+            [&](float cosine) { return bodies[i]->enters(cosine, material.roughness.value); }, bake_options, progress);
         stats.bake_rays += irradiance.rays;
         stats.dropped_samples += irradiance.dropped_samples;
         keep_entering(resolver.entering(static_cast<std::uint32_t>(i), in_world), irradiance);

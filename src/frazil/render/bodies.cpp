@@ -111,8 +111,8 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
             const bool lacks_single = traced > 0.0 && lacks_single_scattering(material->profile);
-            by_angle = lacks_single ? std::make_shared<const std::array<DirectionalAlbedo, 3>>()
-                                    : directional_albedos(medium);
+            by_angle =
+                lacks_single ? std::make_shared<const std::array<DirectionalAlbedo, 3>>() : directional_albedos(medium);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
         bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
@@ -158,11 +158,10 @@ std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
     const auto make = [&](PlacementMask mask) {
-        return make_tree(
-            points, body.plain_kernel,
-            thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, seen_through,
-                           sets_.shells(leader), mask),
-            1);
+        return make_tree(points, body.plain_kernel,
+                         thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, seen_through,
+                                        sets_.shells(leader), mask),
+                         1);
     };
     if (!is_shared(leader)) return make(nullptr);
     auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];

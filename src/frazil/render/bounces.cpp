@@ -189,8 +189,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
                 sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
                 reflected(hits, radiance);
             },
-            [&](float cosine) { return bodies[i]->enters(cosine, bodies[i]->material->roughness.value); },
-            bake_options, progress);
+            [&](float cosine) { return bodies[i]->enters(cosine, bodies[i]->material->roughness.value); }, bake_options,
+            progress);
         stats.bake_rays += last[i].rays;
         stats.dropped_samples += last[i].dropped_samples;
     }

@@ -49,12 +49,10 @@ class Neighbourhoods {
 
 }  // namespace
 
-void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length,
-              std::vector<Rgb>& irradiance) {
+void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length, std::vector<Rgb>& irradiance) {
     const std::size_t n = points.size(), groups = n > 0 ? irradiance.size() / n : 0;
     const float spacing = static_cast<float>(points.spacing);
-    const float reach =
-        std::clamp(kReach * max_component(length), kFewestSpacings * spacing, kMostSpacings * spacing);
+    const float reach = std::clamp(kReach * max_component(length), kFewestSpacings * spacing, kMostSpacings * spacing);
     const Neighbourhoods neighbourhoods(points, reach);
     Rgb way;  // no farther than the kernel can carry
     for (int c = 0; c < 3; ++c) way[c] = std::clamp(length[c], 0.0f, reach / kReach);
@@ -76,11 +74,11 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
                 const Total& total = totals[k];
                 // The weight of j at k over its area: the kernel is even, its slope odd.
                 const float share = points.areas[k] / total.weight, weight = from.weight / points.areas[k];
-                const V3f slope = (from.slope * (-1.0f / points.areas[k]) - total.slope * (weight / total.weight)) * share;
+                const V3f slope =
+                    (from.slope * (-1.0f / points.areas[k]) - total.slope * (weight / total.weight)) * share;
                 for (std::size_t g = 0; g < groups; ++g) {
                     const Flow& flow = flows[k * groups + g];
-                    irradiance[j * groups + g] +=
-                        Rgb(flow[0].dot(slope), flow[1].dot(slope), flow[2].dot(slope)) * way;
+                    irradiance[j * groups + g] += Rgb(flow[0].dot(slope), flow[1].dot(slope), flow[2].dot(slope)) * way;
                 }
             });
         }

@@ -192,7 +192,8 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             core.is_primary = path.bounce == 0;
             add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
-                core.drift *= core.is_primary ? body->drift_within(chord_behind(surface, path.ray.direction, tile)) : 0.0f;
+                core.drift *=
+                    core.is_primary ? body->drift_within(chord_behind(surface, path.ray.direction, tile)) : 0.0f;
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {
                 *split = path;
@@ -223,7 +224,8 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
 float PathTracer::chord_behind(const Surface& surface, const V3f& direction, Tile& tile) const {
     ++tile.rays;
     Hit hit;
-    const bool is_hit = ray_scene_.intersect({offset_origin(surface.position, -surface.geometric_normal), direction}, hit);
+    const bool is_hit =
+        ray_scene_.intersect({offset_origin(surface.position, -surface.geometric_normal), direction}, hit);
     return is_hit ? hit.t : std::numeric_limits<float>::infinity();
 }
 

@@ -162,7 +162,8 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     path.spread += lobe_spread(alpha);
     path.add_blur(alpha);
     if (body != InsideOf::kNone) {
-        path.begin_piece(core_at(path, surface, body, body == crossing.from), bodies_[std::size_t(body)]->material->volume);
+        path.begin_piece(core_at(path, surface, body, body == crossing.from),
+                         bodies_[std::size_t(body)]->material->volume);
     }
     return true;
 }

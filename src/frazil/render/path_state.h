@@ -58,7 +58,7 @@ struct Frame {
 struct IceCore {
     int body = InsideOf::kNone;
     V3f position = V3f(0.0f);
-    V3f normal = V3f(0.0f);                 // outwards; 0 where the position lies inside, not on the surface
+    V3f normal = V3f(0.0f);  // outwards; 0 where the position lies inside, not on the surface
     // From there to below where the light that is seen was scattered last, on the mean, in a body without another side.
     V3f drift = V3f(0.0f);
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index

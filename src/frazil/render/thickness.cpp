@@ -37,8 +37,7 @@ bool find_chords(const V3f& position, const V3f& normal, std::span<const V2f> u,
 }  // namespace
 
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once, float seen_through, const Shells* shells,
-                                PlacementMask mask) {
+                                const Rgb& traced_once, float seen_through, const Shells* shells, PlacementMask mask) {
     Rgb returned(1.0f);  // A
     for (int c = 0; c < 3; ++c) {
         const double scatter = medium.sigma_s_prime[c];

@@ -22,6 +22,7 @@ namespace frazil {
 // irradiance). `seen_through`, 0..1: how much of what goes straight through rays trace on (IceMaterial::refraction). `shells`
 // that are one body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
 std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium,
-                                const Rgb& traced_once, float seen_through = 0.0f, const Shells* shells = nullptr, PlacementMask mask = nullptr);
+                                const Rgb& traced_once, float seen_through = 0.0f, const Shells* shells = nullptr,
+                                PlacementMask mask = nullptr);
 
 }  // namespace frazil

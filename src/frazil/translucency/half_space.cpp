@@ -56,7 +56,7 @@ std::vector<double> h_function(double alpha, const Nodes& nodes) {
 // Light in a half space under a uniform sky of radiance 1, by the nodes of cosines inside.
 struct SkyLight {
     Nodes nodes;
-    std::vector<double> h, reflected;  // H; what the boundary reflects from inside
+    std::vector<double> h, reflected;     // H; what the boundary reflects from inside
     std::vector<double> entered, inward;  // radiance that entered, and all that goes in: with what was reflected inside
     double entered_flux = 0.0;
 
@@ -96,7 +96,8 @@ SkyLight sky_light(double alpha, double eta) {
     double before = 0.0;
     for (int step = 0; step < 2000; ++step) {
         std::vector<double> outward(n);
-        for (std::size_t i = 0; i < n; ++i) outward[i] = scattered(alpha, mu[i], sky.h[i], sky.nodes, sky.h, sky.inward);
+        for (std::size_t i = 0; i < n; ++i)
+            outward[i] = scattered(alpha, mu[i], sky.h[i], sky.nodes, sky.h, sky.inward);
         for (std::size_t i = 0; i < n; ++i) sky.inward[i] = sky.entered[i] + sky.reflected[i] * outward[i];
         const double all = sky.flux(outward);
         if (std::abs(all - before) < 1e-10 * sky.entered_flux) break;
@@ -132,8 +133,7 @@ DirectionalAlbedo::DirectionalAlbedo(double alpha, double eta) {
         const double root = double(i) / kSteps, mu = root * root;
         // H(mu) from H at the nodes.
         const double h = 1.0 / (std::sqrt(1.0 - alpha) + scattered(alpha, mu, 1.0, sky.nodes, sky.h, ones));
-        values_[std::size_t(i)] =
-            static_cast<float>(scattered(alpha, mu, h, sky.nodes, sky.h, sky.inward) / mean);
+        values_[std::size_t(i)] = static_cast<float>(scattered(alpha, mu, h, sky.nodes, sky.h, sky.inward) / mean);
     }
 }
 
