@@ -92,7 +92,7 @@ TEST_CASE("drift: light on a sphere gathers beyond where it grazes") {
         const Rgb value(std::max(0.0f, n.dot(sun)));
         irradiance.push_back(value);
         flows.emplace_back();
-        add_flow(flows.back(), value, sun, n);
+        add_flow(flows.back(), value, along_surface(sun, n));
     }
     std::vector<Rgb> moved = irradiance;
     carry_on(points, flows, Rgb(0.1f), moved);

@@ -47,6 +47,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 hit.direction = s * local.x + t * local.y + place.normal * local.z;
                 const V3f origin = offset_origin(place.position, place.normal);
                 if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
+                hit.along = along_surface(hit.direction, place.normal);
                 hit.position = origin + hit.direction * hit.surface.t;
                 // Cosine-distributed rays leave pi T L / n.
                 hit.weight =
@@ -67,7 +68,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
                 const std::size_t row = hits[i].point * groups + g;
                 result.values[row] += value;
                 if (options.with_flows) {
-                    add_flow(result.flows[row], value, hits[i].direction, points.normals[hits[i].point]);
+                    add_flow(result.flows[row], value, hits[i].along);
                 }
             }
         }

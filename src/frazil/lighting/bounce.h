@@ -21,6 +21,7 @@ struct BounceHit {
     V3f position;             // on the surface, metres
     V3f direction;            // from the point to the surface, unit length
     Rgb weight = Rgb(0.0f);   // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
+    V3f along;                // where its light travels along the point's surface: along_surface()
     Hit surface;
 };
 

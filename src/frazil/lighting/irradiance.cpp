@@ -73,7 +73,7 @@ void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& ta
         sum += V3d(value);
         const Place& place = work.places[work.place_of[work.sample_of[i]]];
         moment += V3d(place.position - about) * (double(value.x) + double(value.y) + double(value.z));
-        add_flow(flow, value, work.rays[i].direction, place.normal);
+        add_flow(flow, value, along_surface(work.rays[i].direction, place.normal));
         work.arriving[work.sample_of[i]] = luminance(value);
     }
     // Two samples that follow one another lie in neighbouring strata: their difference tells the variance within.

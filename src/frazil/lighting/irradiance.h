@@ -31,8 +31,12 @@ struct Flow {
     const V3f& operator[](std::size_t c) const { return channel[c]; }
 };
 
-inline void add_flow(Flow& flow, const Rgb& irradiance, const V3f& towards_light, const V3f& normal) {
-    const V3f along = normal * towards_light.dot(normal) - towards_light;
+// The part along the surface of light's direction.
+inline V3f along_surface(const V3f& towards_light, const V3f& normal) {
+    return normal * towards_light.dot(normal) - towards_light;
+}
+
+inline void add_flow(Flow& flow, const Rgb& irradiance, const V3f& along) {
     for (int c = 0; c < 3; ++c) flow[static_cast<std::size_t>(c)] += along * irradiance[c];
 }
 

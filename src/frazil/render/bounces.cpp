@@ -15,10 +15,6 @@ namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
 
-// Rays that look around from all points together, at most, so that what they find fits in memory: 36 bytes each where
-// they meet ice.
-constexpr std::size_t kMostSightlines = std::size_t(1) << 27;
-
 // A point that sees a point of ice: the light of `sender` counts so much in that of `receiver`.
 struct Sightline {
     std::uint32_t receiver;  // index into the points of the object at hand
@@ -26,7 +22,11 @@ struct Sightline {
     std::uint32_t sender;    // index into the points of its set
     Rgb weight;              // irradiance per exitance
     Rgb mirrored;            // irradiance per irradiance that enters there: what the surface reflects
+    V3f along;               // BounceHit's
 };
+
+// Rays that look around from all points together, at most, so that what they find fits in 4 GB.
+constexpr std::size_t kMostSightlines = (std::size_t(1) << 32) / sizeof(Sightline);
 
 // All that an object's points see, batch after batch of points.
 using Sightlines = std::vector<std::vector<Sightline>>;
@@ -83,7 +83,7 @@ class IceFinder {
             const Body& body = *bodies_[hit.surface.placement];
             found.push_back({hit.point, static_cast<std::uint32_t>(leader), point,
                              body.radiance_per_exitance(surface, -hit.direction) * hit.weight,
-                             hit.weight * mirrored_radiance(body, surface, -hit.direction)});
+                             hit.weight * mirrored_radiance(body, surface, -hit.direction), hit.along});
         }
         found.shrink_to_fit();
         return found;
@@ -97,19 +97,16 @@ class IceFinder {
 };
 
 // Light along all sightlines of an object: what the points that are seen send.
-void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, const std::vector<PointSet>& seen,
-               const PointSet& points, Irradiance& light) {
+void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies, Irradiance& light) {
     parallel_for(sightlines.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t batch = begin; batch < end; ++batch) {
             for (const Sightline& line : sightlines[batch]) {
                 const Exchange& body = bodies[line.body];
                 const std::size_t from = line.sender * light.groups, to = line.receiver * light.groups;
-                const V3f direction =
-                    (seen[line.body].positions[line.sender] - points.positions[line.receiver]).normalized();
                 for (std::size_t g = 0; g < light.groups; ++g) {
                     const Rgb value = body.exitance[from + g] * line.weight + body.entering[from + g] * line.mirrored;
                     light.values[to + g] += value;
-                    add_flow(light.flows[to + g], value, direction, points.normals[line.receiver]);
+                    add_flow(light.flows[to + g], value, line.along);
                 }
             }
         }
@@ -167,12 +164,10 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     std::vector<Sightlines> sightlines(lit.size());
     std::vector<Irradiance> last(lit.size());  // what the last bounce brought; at first what surfaces reflect
     std::vector<std::vector<float>> entering(lit.size());
-    std::vector<PointSet> in_world(lit.size()), seen(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
-        in_world[i] = lit[i].points.in_world();
-        if (sets.is_leader(i)) seen[i] = sets.points(i).in_world();
-        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world[i]);
+        const PointSet in_world = lit[i].points.in_world();
+        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world);
         IrradianceOptions bake_options{rays, options.seed};
         Mesh mesh;
         const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
@@ -183,7 +178,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         sightlines[i].resize((lit[i].points.size() + kPointsPerBounceBatch - 1) / kPointsPerBounceBatch);
         bake_options.with_flows = true;
         last[i] = bake_bounce(
-            in_world[i], ray_scene, groups,
+            in_world, ray_scene, groups,
             [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
                 if (hits.empty()) return;
                 sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
@@ -210,7 +205,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
                 std::fill(last[i].values.begin(), last[i].values.end(), Rgb(0.0f));
                 std::fill(last[i].flows.begin(), last[i].flows.end(), Flow{});
             }
-            add_light(sightlines[i], exchange, seen, in_world[i], last[i]);
+            add_light(sightlines[i], exchange, last[i]);
             keep_entering(entering[i], last[i]);
             for (std::size_t k = 0; k < last[i].values.size(); ++k) {
                 lit[i].irradiance[k] += last[i].values[k];

@@ -10,6 +10,8 @@ namespace {
 
 // The kernel's radius: in drift lengths, and in spacings at least and at most.
 constexpr float kReach = 2.0f, kFewestSpacings = 2.0f, kMostSpacings = 6.0f;
+// Of facing normals, and of the kernel's reach that lies between the surfaces, at least.
+constexpr float kGap = 0.1f;
 
 // (1 - q)² over the squared distance q, times area: what a neighbour weighs, and its gradient where the light is.
 struct Neighbour {
@@ -35,13 +37,19 @@ class Neighbourhoods {
         lookup_.visit(position, [&](std::uint32_t point, const V3f& p, const V3f& n) {
             const V3f way = position - p;
             const float q = way.length2() / (reach_ * reach_);
-            if (q >= 1.0f || (n.dot(normal) < 0.0f && way.dot(normal) < 0.0f && way.dot(n) > 0.0f)) return;
+            if (q >= 1.0f || is_across_a_gap(way, normal, n)) return;
             const float area = points_.areas[point];
             use({point, (1.0f - q) * (1.0f - q) * area, way * (-4.0f * (1.0f - q) / (reach_ * reach_) * area)});
         });
     }
 
   private:
+    // Whether surfaces face each other across what is not the body; the same from either side.
+    bool is_across_a_gap(const V3f& way, const V3f& normal, const V3f& other) const {
+        const float least = kGap * reach_;
+        return normal.dot(other) < -kGap && way.dot(normal) < -least && way.dot(other) > least;
+    }
+
     const PointSet& points_;
     float reach_;
     PointLookup lookup_;
