@@ -68,10 +68,10 @@ HWY_INLINE void lattice_noise(const V3f& place, std::uint32_t seed, float* HWY_R
     constexpr std::size_t kComponents = sizeof...(shifts);
     alignas(32) float corners[kComponents][kLanes];
     for (std::size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-        const UIntV cell = hn::Xor(hn::Xor(hn::Add(hn::Set(du, x), hn::Load(du, kStepX + i)),
-                                           hn::Add(hn::Set(du, y), hn::Load(du, kStepY + i))),
-                                   hn::Xor(hn::Add(hn::Set(du, z), hn::Load(du, kStepZ + i)),
-                                           hn::Set(du, seed * kCellSeed)));
+        const UIntV cell =
+            hn::Xor(hn::Xor(hn::Add(hn::Set(du, x), hn::Load(du, kStepX + i)),
+                            hn::Add(hn::Set(du, y), hn::Load(du, kStepY + i))),
+                    hn::Xor(hn::Add(hn::Set(du, z), hn::Load(du, kStepZ + i)), hn::Set(du, seed * kCellSeed)));
         const UIntV h = hashes(cell);
         const FloatV px = hn::Sub(hn::Set(d, dx), hn::Load(d, kCornerX + i)),
                      py = hn::Sub(hn::Set(d, dy), hn::Load(d, kCornerY + i)),
@@ -137,8 +137,7 @@ HWY_INLINE void fill(Row& row, const V3f& place, const V3i& cell, std::uint32_t 
     const std::uint32_t base = std::uint32_t(cell.x) * kCellX,
                         rest = (std::uint32_t(cell.y) * kCellY) ^ (std::uint32_t(cell.z) * kCellZ) ^ (seed * kCellSeed);
     for (std::size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-        const UIntV h =
-            hashes(hn::Xor(hn::Add(hn::Set(du, base), hn::Load(du, kRowX + i)), hn::Set(du, rest)));
+        const UIntV h = hashes(hn::Xor(hn::Add(hn::Set(du, base), hn::Load(du, kRowX + i)), hn::Set(du, rest)));
         const auto coordinate = [&](FloatV corner, UIntV bits, float from) {
             const FloatV tens = hn::ConvertTo(d, hn::BitCast(di, hn::And(bits, hn::Set(du, 1023U))));
             const FloatV within = hn::Mul(hn::Add(tens, hn::Set(d, 0.5f)), hn::Set(d, kTenBits));
@@ -209,9 +208,10 @@ CellWall nearest_cell_wall_here(const V3f& place, float reach, std::uint32_t see
             const FloatV dot = hn::Add(hn::Add(hn::Mul(hn::Add(px, nx), ax), hn::Mul(hn::Add(py, ny), ay)),
                                        hn::Mul(hn::Add(pz, nz), az));
             const FloatV distance = hn::Div(dot, hn::Add(length, length));
-            const auto is_near = hn::And(hn::And(hn::Le(distance, hn::Set(d, reach)), hn::Lt(distance, hn::Set(d, wall.distance))),
-                                         hn::And(hn::Gt(length, hn::Set(d, 1e-6f)),
-                                                 hn::Lt(hn::Load(d, here.distance2 + i), hn::Set(d, kNowhere))));
+            const auto is_near =
+                hn::And(hn::And(hn::Le(distance, hn::Set(d, reach)), hn::Lt(distance, hn::Set(d, wall.distance))),
+                        hn::And(hn::Gt(length, hn::Set(d, 1e-6f)),
+                                hn::Lt(hn::Load(d, here.distance2 + i), hn::Set(d, kNowhere))));
             if (hn::AllFalse(d, is_near)) continue;
             alignas(32) float distances[kLanes], lengths[kLanes];
             hn::Store(hn::IfThenElse(is_near, distance, hn::Set(d, kNowhere)), d, distances);

@@ -255,9 +255,9 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     path.light_share = Rgb(1.0f);
 
     // Russian roulette on what the path may still bring.
-    static const float kWorthwhile = getenv("FZ_RR") ? atof(getenv("FZ_RR")) : 0.25f;
-    static const float kFirstR = getenv("FZ_RR1") ? atof(getenv("FZ_RR1")) : 0.25f;
-    if (!path.survives(path.worth() / (path.scattered > kBouncesBeforeRoulette ? 1.0f : path.bounce==1? kFirstR:kWorthwhile))) return false;
+    if (path.scattered > kBouncesBeforeRoulette) {
+        if (!path.survives(path.worth())) return false;
+    }
     path.leave_from(surface.lifted, surface.geometric_normal, wi);
     if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
         path.begin_piece(core_at(surface, filled, true), bodies_[std::size_t(filled)]->material->volume);

@@ -31,7 +31,7 @@ constexpr std::uint32_t kCameraDimensions = 1;  // of the sampler, pairs
 // Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
 constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
 // Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter.
-constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16;
+constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16, kMostSamplesPerPass = 128;
 
 std::vector<std::size_t> groups_of(const std::vector<Light>& lights, const std::vector<std::string>& groups) {
     std::vector<std::size_t> result;
@@ -143,7 +143,14 @@ class Canvas {
     Film finish() { return sums_.finish(); }
 
   private:
-    int samples_per_pass() const { return options_.noise > 0.0f ? kSamplesPerNoisePass : kSamplesPerPass; }
+    int samples_per_pass() const {
+        if (options_.noise > 0.0f) return kSamplesPerNoisePass;
+        // Samples that are not shaded ask for nothing.
+        const int shaded = options_.shading_samples > 0 ? std::min(options_.shading_samples, options_.samples) : 0;
+        return shaded > 0
+                   ? std::clamp(kSamplesPerPass * options_.samples / shaded, kSamplesPerPass, kMostSamplesPerPass)
+                   : kSamplesPerPass;
+    }
     bool has_wanted_pixel(const Region& r) const {
         for (int y = r.y0; y < r.y1; ++y) {
             for (int x = r.x0; x < r.x1; ++x) {
