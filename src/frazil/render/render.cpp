@@ -30,7 +30,8 @@ constexpr int kTileSize = 16;                   // pixels along a side
 constexpr std::uint32_t kCameraDimensions = 1;  // of the sampler, pairs
 // Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
 constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
-// Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter.
+// Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter, where
+// few samples are shaded they are longer.
 constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16, kMostSamplesPerPass = 128;
 
 std::vector<std::size_t> groups_of(const std::vector<Light>& lights, const std::vector<std::string>& groups) {
@@ -145,11 +146,10 @@ class Canvas {
   private:
     int samples_per_pass() const {
         if (options_.noise > 0.0f) return kSamplesPerNoisePass;
+        if (options_.shading_samples == 0) return kSamplesPerPass;
         // Samples that are not shaded ask for nothing.
-        const int shaded = options_.shading_samples > 0 ? std::min(options_.shading_samples, options_.samples) : 0;
-        return shaded > 0
-                   ? std::clamp(kSamplesPerPass * options_.samples / shaded, kSamplesPerPass, kMostSamplesPerPass)
-                   : kSamplesPerPass;
+        const auto per_pass = std::int64_t(kSamplesPerPass) * options_.samples / options_.shading_samples;
+        return static_cast<int>(std::clamp<std::int64_t>(per_pass, kSamplesPerPass, kMostSamplesPerPass));
     }
     bool has_wanted_pixel(const Region& r) const {
         for (int y = r.y0; y < r.y1; ++y) {
