@@ -54,7 +54,8 @@ const std::array<V3f, kPlaneFamilies>& family_normals(std::uint32_t seed) {
     thread_local std::array<Known, 16> known;
     Known& of_seed = known[hash(seed) % known.size()];
     if (!of_seed.is_filled || of_seed.seed != seed) {
-        for (int family = 0; family < kPlaneFamilies; ++family) of_seed.normals[std::size_t(family)] = family_normal(seed, family);
+        for (int family = 0; family < kPlaneFamilies; ++family)
+            of_seed.normals[std::size_t(family)] = family_normal(seed, family);
         of_seed.seed = seed, of_seed.is_filled = true;
     }
     return of_seed.normals;
