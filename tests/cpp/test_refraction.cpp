@@ -198,6 +198,32 @@ TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) bet
     }
 }
 
+TEST_CASE("faint light along a shadow ray goes on by chance: as much as Beer-Lambert lets through, on average") {
+    for (const float depth : {0.5f, 3.0f, 5.0f}) {
+        Scene scene =
+            scene_of(box_of(V3f(-1.0f), V3f(1.0f)), clear_ice(Rgb(0.25f * depth, 0.5f * depth, depth), 1.0f, 0.3f));
+        const RayScene ray_scene(scene.meshes, {Placement{}});
+        const std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
+        const SurfaceResolver resolver(scene);
+        const Interiors interiors(scene, ray_scene, resolver, bodies);
+        constexpr int kRays = 400;
+        Rgb sum(0.0f);
+        std::uint64_t rays = 0;
+        for (int j = 0; j < kRays; ++j) {
+            for (int i = 0; i < kRays; ++i) {
+                const V3f origin((float(i) + 0.5f) / kRays - 0.5f, 2.0f, (float(j) + 0.5f) / kRays - 0.5f);
+                sum += interiors.visibility({origin, V3f(0.0f, -1.0f, 0.0f)}, {}, rays);
+            }
+        }
+        for (int c = 0; c < 3; ++c) {
+            const double left = std::exp(-2.0 * double(depth) * (c == 2 ? 1.0 : c == 1 ? 0.5 : 0.25));
+            CAPTURE(depth);
+            CAPTURE(c);
+            CHECK(double(sum[c]) / (double(kRays) * kRays) == doctest::Approx(left).epsilon(0.04));
+        }
+    }
+}
+
 TEST_CASE("a camera inside ice sees the sky through its boundary") {
     Scene scene = scene_of(sphere(1.0f, 5), clear_ice(Rgb(0.5f), 1.31f, 0.05f));
     model(scene).translucency = 0.0f;

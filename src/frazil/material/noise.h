@@ -17,6 +17,12 @@ float gradient_noise(const V3f& place, std::uint32_t seed);
 
 inline constexpr float kLacunarity = 2.03f;
 
+// How much of an octave is seen: a footprint wider than half a cell sees its mean, which is 0.
+inline float octave_seen(float footprint, float frequency) {
+    const float seen = 2.0f - 4.0f * footprint * frequency;
+    return seen < 0.0f ? 0.0f : seen > 1.0f ? 1.0f : seen;
+}
+
 // Three independent ones at once.
 V3f vector_noise(const V3f& place, std::uint32_t seed);
 
@@ -34,10 +40,13 @@ struct CellWall {
 CellWall nearest_cell_wall(const V3f& place, float reach, std::uint32_t seed);
 
 // The random point of a lattice cell, and a hash of the cell.
+inline constexpr float kTenBits = 1.0f / 1024.0f;
+inline constexpr std::uint32_t kCellX = 0x8da6b343U, kCellY = 0xd8163841U, kCellZ = 0xcb1ab31fU,
+                               kCellSeed = 0x9e3779b9U;
 V3f cell_point(int x, int y, int z, std::uint32_t seed);
 inline std::uint32_t cell_hash(int x, int y, int z, std::uint32_t seed) {
-    return hash((std::uint32_t(x) * 0x8da6b343U) ^ (std::uint32_t(y) * 0xd8163841U) ^ (std::uint32_t(z) * 0xcb1ab31fU) ^
-                (seed * 0x9e3779b9U));
+    return hash((std::uint32_t(x) * kCellX) ^ (std::uint32_t(y) * kCellY) ^ (std::uint32_t(z) * kCellZ) ^
+                (seed * kCellSeed));
 }
 
 }  // namespace frazil

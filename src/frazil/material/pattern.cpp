@@ -1,5 +1,6 @@
 #include "frazil/material/pattern.h"
 
+#include <array>
 #include <cmath>
 
 #include "frazil/base/error.h"
@@ -43,11 +44,28 @@ V3f family_normal(std::uint32_t seed, int family) {
     return {r * std::cos(phi), z, r * std::sin(phi)};
 }
 
+// Those of all families. Rays ask for the same few seeds over and over: each thread remembers some.
+const std::array<V3f, kPlaneFamilies>& family_normals(std::uint32_t seed) {
+    struct Known {
+        bool is_filled = false;
+        std::uint32_t seed = 0;
+        std::array<V3f, kPlaneFamilies> normals;
+    };
+    thread_local std::array<Known, 16> known;
+    Known& of_seed = known[hash(seed) % known.size()];
+    if (!of_seed.is_filled || of_seed.seed != seed) {
+        for (int family = 0; family < kPlaneFamilies; ++family)
+            of_seed.normals[std::size_t(family)] = family_normal(seed, family);
+        of_seed.seed = seed, of_seed.is_filled = true;
+    }
+    return of_seed.normals;
+}
+
 // Planes of one family stand `size` times the number of families apart, each moved at random, bent by smooth noise and cut
 // off where a noise of its own falls short.
 struct PlaneFamily {
     PlaneFamily(const Pattern& pattern, int family)
-        : normal(family_normal(pattern.seed, family)),
+        : normal(family_normals(pattern.seed)[std::size_t(family)]),
           pitch(pattern.size * kPlaneFamilies),
           seed(hash(pattern.seed, std::uint32_t(family))) {}
 

@@ -52,6 +52,13 @@ PointLookup::PointLookup(const PointSet& points, double reach) {
     }
 }
 
+std::vector<std::uint32_t> PointLookup::order() const {
+    std::vector<std::uint32_t> result;
+    result.reserve(entries_.size());
+    for (const Entry& entry : entries_) result.push_back(entry.index);
+    return result;
+}
+
 std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
     return hash(std::uint32_t(x), std::uint32_t(y), std::uint32_t(z)) & mask_;
 }

@@ -26,7 +26,10 @@ class PointLookup {
     // lies within two spacings.
     std::uint32_t nearest(const V3f& position, const V3f& normal) const;
 
-    // visit(index, position, normal), once for every point within reach and for some beyond.
+    // The points' indices in the order of the lookup, in which those near to each other mostly are neighbours.
+    std::vector<std::uint32_t> order() const;
+
+    // visit(k, position, normal), once for every point within reach and for some beyond; the point's index is order()[k].
     template <class Visit>
     void visit(const V3f& position, const Visit& visit) const;
 
@@ -72,7 +75,7 @@ void PointLookup::visit(const V3f& position, const Visit& visit) const {
         if (std::find(done.begin(), done.begin() + count, b) != done.begin() + count) continue;
         done[count++] = b;
         for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
-            visit(entries_[k].index, entries_[k].position, normals_[k]);
+            visit(k, entries_[k].position, normals_[k]);
         }
     }
 }

@@ -13,6 +13,10 @@ namespace {
 // shorter: exitance is linear over it within one or two thousandths.
 constexpr float kCell = 0.5f;
 
+// Points nearer to each other than so many mean free paths serve the camera too: a blend of them is as near to a gather as
+// its tolerance.
+constexpr float kDense = 0.25f;
+
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 // What the requests of one body are answered with, and which row each takes.
@@ -69,17 +73,18 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     Gathered blended;
     std::vector<Rgb> blended_thin;
     std::vector<std::uint32_t> is_blended;
+    const Medium& medium = body.medium;
+    const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
+    const bool serves_camera = body.spacing <= kDense * mean_free_path && !body.overlay_tree;
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
-        if (request.is_primary || request.normal == V3f(0.0f)) continue;
+        if ((request.is_primary && !serves_camera) || request.normal == V3f(0.0f)) continue;
         V3f normal;
         body.to_points.multDirMatrix(request.normal, normal);
         if (!body.at_points->append(request.position * body.to_points, normal, blended, blended_thin)) continue;
         answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
         is_blended.push_back(i);
     }
-    const Medium& medium = body.medium;
-    const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
     const std::vector<V3f> at_tree = moved(places, body.to_points);
     answers.gathered = body.tree->gather(at_tree.data(), at_tree.size(), options);

@@ -1,6 +1,7 @@
 #include "frazil/render/interior.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -16,6 +17,8 @@ namespace {
 constexpr double kLargestHole = 0.02;
 constexpr int kMostCrossings = 32;
 constexpr float kNothing = 1e-4f;
+// Light along a shadow ray of which less is left goes on by chance: what dims it further, overlays first of all, is dear.
+constexpr float kFaint = 0.1f;
 constexpr float kFarAway = 1e18f;  // metres; finite, so that 0 times it is 0
 
 struct Enclosure {
@@ -214,6 +217,9 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
         return Rgb(ray_scene_.is_occluded(ray) ? 0.0f : 1.0f);
     }
     Rgb result(1.0f);
+    std::uint32_t coin =
+        hash(std::bit_cast<std::uint32_t>(ray.direction.x), std::bit_cast<std::uint32_t>(ray.direction.y),
+             std::bit_cast<std::uint32_t>(ray.origin.x));
     Ray rest = ray;
     bool is_within = filling(inside) != InsideOf::kNone;  // the ice that the ray begins in
     // What a boundary lets through, its overlays first of all, is asked once it is known that the ice behind it does not
@@ -224,7 +230,7 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
     };
     std::optional<Boundary> entered;
     const auto pass = [&](const Boundary& boundary) {
-        const Surface surface = resolver_.resolve(boundary.hit, ray.direction, footprint);
+        const Surface surface = resolver_.resolve_passage(boundary.hit, ray.direction, footprint);
         const Body& ice = *bodies_[boundary.hit.placement];
         const float cosine = std::abs(surface.normal.dot(ray.direction));
         result *= ice.transmittance(cosine, surface.covering.roughness) * (1.0f - surface.covering.covered);
@@ -252,13 +258,17 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
             const Rgb absorbed = absorbs ? medium.sigma_a * through.absorption : Rgb(0.0f);
             result *= exp(-(medium.sigma_s_prime * through.scattering + absorbed));
         }
-        if (max_component(result) < kNothing) return Rgb(0.0f);
+        if (max_component(result) < kNothing || (is_hit && !is_open_to_rays(hit.placement))) return Rgb(0.0f);
+        if (const float chance = max_component(result) / kFaint; chance < 1.0f) {
+            coin = hash(coin);
+            if (!(to_unit_float(coin) < chance)) return Rgb(0.0f);
+            result /= chance;
+        }
         if (entered) {
             pass(*entered);
             entered.reset();
         }
         if (!is_hit) return result;
-        if (!is_open_to_rays(hit.placement) || max_component(result) < kNothing) return Rgb(0.0f);
 
         const Crossing crossing = cross(hit, rest.direction, inside);
         if (crossing.is_boundary() && (crossing.from == InsideOf::kNone) != (crossing.to == InsideOf::kNone)) {

@@ -39,8 +39,10 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     plan.bytes -= bytes;
     plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(points, kReach * static_cast<float>(points.spacing)));
-    result->at_points_ = body.tree->gather(points.positions.data(), points.size(), options);
-    result->thin_ = thickness_gains(body.thickness.get(), points.positions.data(), points.size(), options);
+    std::vector<V3f> places;
+    for (const std::uint32_t i : result->lookup_.order()) places.push_back(points.positions[i]);
+    result->at_points_ = body.tree->gather(places.data(), places.size(), options);
+    result->thin_ = thickness_gains(body.thickness.get(), places.data(), places.size(), options);
     return result;
 }
 

@@ -42,7 +42,7 @@ class PointGathers {
 
     PointLookup lookup_;
     float reach_;
-    Gathered at_points_;
+    Gathered at_points_;  // in the order of the lookup
     std::vector<Rgb> thin_;
 };
 

@@ -30,8 +30,9 @@ constexpr int kTileSize = 16;                   // pixels along a side
 constexpr std::uint32_t kCameraDimensions = 1;  // of the sampler, pairs
 // Memory for gathers at the points of all bodies; bodies that it does not suffice for are gathered wherever they are seen.
 constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
-// Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter.
-constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16;
+// Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter, where
+// few samples are shaded they are longer.
+constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16, kMostSamplesPerPass = 128;
 
 std::vector<std::size_t> groups_of(const std::vector<Light>& lights, const std::vector<std::string>& groups) {
     std::vector<std::size_t> result;
@@ -143,7 +144,13 @@ class Canvas {
     Film finish() { return sums_.finish(); }
 
   private:
-    int samples_per_pass() const { return options_.noise > 0.0f ? kSamplesPerNoisePass : kSamplesPerPass; }
+    int samples_per_pass() const {
+        if (options_.noise > 0.0f) return kSamplesPerNoisePass;
+        if (options_.shading_samples == 0) return kSamplesPerPass;
+        // Samples that are not shaded ask for nothing.
+        const auto per_pass = std::int64_t(kSamplesPerPass) * options_.samples / options_.shading_samples;
+        return static_cast<int>(std::clamp<std::int64_t>(per_pass, kSamplesPerPass, kMostSamplesPerPass));
+    }
     bool has_wanted_pixel(const Region& r) const {
         for (int y = r.y0; y < r.y1; ++y) {
             for (int x = r.x0; x < r.x1; ++x) {

@@ -262,13 +262,23 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
     }
     surface.horizon = surface.normal;
     if (!mesh.colors.is_empty()) surface.display_color = mesh.colors.at(mesh.triangles, hit.triangle, hit.uv);
+    look(hit, wo, footprint, with_bump, surface);
+    return surface;
+}
 
+Surface SurfaceResolver::resolve_passage(const Hit& hit, const V3f& direction, float footprint) const {
+    Surface surface = glimpse(hit, direction);
+    look(hit, -direction, footprint, false, surface);
+    return surface;
+}
+
+void SurfaceResolver::look(const Hit& hit, const V3f& wo, float footprint, bool with_bump, Surface& surface) const {
     const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
-    const bool has_images = reads_images_[object.material];
+    const bool has_images = reads_images_[scene_.objects[hit.placement].material];
     if (!has_images && !(ice && !ice->overlays.empty())) {
         surface.texture_point.st = surface.st;
         if (ice) surface.covering = covering(*ice, surface.texture_point, footprint, false);
-        return surface;
+        return;
     }
     // Patterns and images see the surface from outside, whichever side the viewer is on.
     const float side = hit.geometric_normal.dot(surface.geometric_normal) < 0.0f ? -1.0f : 1.0f;
@@ -298,7 +308,6 @@ Surface SurfaceResolver::resolve(const Hit& hit, const V3f& direction, float foo
             normal -= surface.geometric_normal * (normal.dot(surface.geometric_normal) - 1e-3f);
         surface.normal = bent_towards_viewer(normal.normalized(), wo);
     }
-    return surface;
 }
 
 }  // namespace frazil

@@ -43,6 +43,10 @@ class SurfaceResolver {
     // normal map are left out where the surface only lets light pass.
     Surface resolve(const Hit& hit, const V3f& direction, float footprint = 0.0f, bool with_bump = false) const;
 
+    // What light that goes straight through the surface of a hit meets: place, smooth normals and covering, as resolve gives
+    // them without bump.
+    Surface resolve_passage(const Hit& hit, const V3f& direction, float footprint) const;
+
     // What a hit shows before it is shaded: place, smooth normals and texture coordinates, as resolve gives them; the rest
     // is left out.
     Surface glimpse(const Hit& hit, const V3f& direction) const;
@@ -68,6 +72,8 @@ class SurfaceResolver {
     };
     // True where vertices have normals that hold there.
     bool place(const Hit& hit, const V3f& direction, Surface& surface) const;
+    // What patterns and images make of a place.
+    void look(const Hit& hit, const V3f& wo, float footprint, bool with_bump, Surface& surface) const;
     Covering covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump) const;
     // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
     TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,
