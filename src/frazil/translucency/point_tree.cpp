@@ -107,6 +107,16 @@ void sum_power(PointTree::Impl& tree, std::uint32_t n) {
 
 }  // namespace
 
+void check_positions(const V3f* positions, std::size_t count) {
+    parallel_for(count, 8192, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (is_finite(positions[i])) continue;
+            throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at row ", i,
+                                 ". Leave that shading point out."));
+        }
+    });
+}
+
 TreeKernel::TreeKernel(const Profile& of_profile, const Ramp& with_ramp)
     : profile(of_profile),
       ramp(with_ramp),
