@@ -233,22 +233,22 @@ def test_energy_preserving_ramp():
     np.testing.assert_allclose(out.exitance[0, 0], out.coverage[0], rtol=0.02)
 
 
+@pytest.mark.parametrize("knots", [[0.05, 0.1, 0.3, 0.9], [0.1], [0.1, 0.10000001], [0.0, 1e-7, 0.2]])
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_layers_of_a_ramp_take_any_colour(estimator):
+def test_layers_of_a_ramp_take_any_colour(estimator, knots):
     """Knot colours times layers = a tree with that ramp, to half precision."""
     points = sphere(4000)
     rng = np.random.default_rng(5)
     irradiance = rng.uniform(0, 1, (4000, 2, 3))
     profile = fz.Dipole(fz.Medium(10.0, 0.1))
     where = points.positions[:200]
-    knots = [0.05, 0.1, 0.3, 0.9]
-    layers = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, np.ones((4, 3)))).gather(
+    layers = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, np.ones((len(knots), 3)))).gather(
         where, estimator=estimator, ramp_layers=True
     )
-    assert layers.layers.shape == (200, 4, 2, 3)
+    assert layers.layers.shape == (200, len(knots), 2, 3)
     np.testing.assert_allclose(layers.layers.sum(1), layers.exitance, rtol=1e-4)
     for preserve_energy in (False, True):
-        ramp = fz.Ramp(knots, rng.uniform(0, 2, (4, 3)), preserve_energy=preserve_energy)
+        ramp = fz.Ramp(knots, rng.uniform(0, 2, (len(knots), 3)), preserve_energy=preserve_energy)
         rendered = fz.PointTree(points, irradiance, profile, ramp).gather(where, estimator=estimator).exitance
         colors = ramp.eval(knots) * ramp.energy_scale(profile)
         total = (layers.layers * colors[None, :, None, :]).sum(1)
