@@ -28,6 +28,7 @@ from ._frazil import Bake
 from .content import content_hash, scene_hash
 from .replacing import DAMAGED_ARCHIVE, replacing
 from .stoppable import Progress, run_stoppable
+from .tolerance import RENDER_TOLERANCE
 from .warning import FrazilWarning
 
 __all__ = ["Bake", "bake", "load_bake", "refresh_bake", "save_bake"]
@@ -80,7 +81,7 @@ def bake(
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,
-    tolerance: float = 0.01,
+    tolerance: float = RENDER_TOLERANCE,
     estimator: str = "noise_free",
     progress: Progress | None = None,
 ) -> Bake:

@@ -29,6 +29,7 @@ from .denoise import check_denoiser, denoise_film
 from .film import Film
 from .mattes import resolve_mattes
 from .stoppable import Progress, run_stoppable
+from .tolerance import RENDER_TOLERANCE
 from .version import version
 from .warning import FrazilWarning
 
@@ -55,7 +56,7 @@ def render(
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,
-    tolerance: float = 0.01,
+    tolerance: float = RENDER_TOLERANCE,
     estimator: str = "noise_free",
     pixel_filter: str = "blackman_harris",
     aovs: Sequence[str] = (),

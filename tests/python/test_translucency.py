@@ -233,22 +233,22 @@ def test_energy_preserving_ramp():
     np.testing.assert_allclose(out.exitance[0, 0], out.coverage[0], rtol=0.02)
 
 
+@pytest.mark.parametrize("knots", [[0.05, 0.1, 0.3, 0.9], [0.1], [0.1, 0.10000001], [0.0, 1e-7, 0.2]])
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_layers_of_a_ramp_take_any_colour(estimator):
+def test_layers_of_a_ramp_take_any_colour(estimator, knots):
     """Knot colours times layers = a tree with that ramp, to half precision."""
     points = sphere(4000)
     rng = np.random.default_rng(5)
     irradiance = rng.uniform(0, 1, (4000, 2, 3))
     profile = fz.Dipole(fz.Medium(10.0, 0.1))
     where = points.positions[:200]
-    knots = [0.05, 0.1, 0.3, 0.9]
-    layers = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, np.ones((4, 3)))).gather(
+    layers = fz.PointTree(points, irradiance, profile, fz.Ramp(knots, np.ones((len(knots), 3)))).gather(
         where, estimator=estimator, ramp_layers=True
     )
-    assert layers.layers.shape == (200, 4, 2, 3)
+    assert layers.layers.shape == (200, len(knots), 2, 3)
     np.testing.assert_allclose(layers.layers.sum(1), layers.exitance, rtol=1e-4)
     for preserve_energy in (False, True):
-        ramp = fz.Ramp(knots, rng.uniform(0, 2, (4, 3)), preserve_energy=preserve_energy)
+        ramp = fz.Ramp(knots, rng.uniform(0, 2, (len(knots), 3)), preserve_energy=preserve_energy)
         rendered = fz.PointTree(points, irradiance, profile, ramp).gather(where, estimator=estimator).exitance
         colors = ramp.eval(knots) * ramp.energy_scale(profile)
         total = (layers.layers * colors[None, :, None, :]).sum(1)
@@ -310,6 +310,62 @@ def test_nan_irradiance_is_left_out_and_counted():
     assert (tree.gather(points.positions).exitance == 0).all()
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("positions", np.nan, "PointTree: positions must be finite, got NaN or infinity at point 3"),
+        ("positions", 1e30, "PointTree: positions must be within 1e[+]15 m of the origin, got 1e[+]30"),
+        ("normals", np.nan, "PointTree: normals must be finite, got NaN or infinity at point 3"),
+        ("areas", np.nan, "PointTree: areas must be >= 0 and finite, got nan at point 3"),
+        ("areas", -1.0, "PointTree: areas must be >= 0 and finite, got -1 at point 3"),
+    ],
+)
+def test_bad_points(field, value, message):
+    points = sphere(10)
+    getattr(points, field)[3] = value
+    with pytest.raises(ValueError, match=message):
+        fz.PointTree(points, np.ones((10, 3)), fz.Dipole(MEDIUM))
+
+
+def test_arrays_that_are_none_are_named():
+    points, profile = sphere(10), fz.Dipole(MEDIUM)
+    with pytest.raises(ValueError, match="PointTree: irradiance must be an array of numbers, got <class 'str'>"):
+        fz.PointTree(points, "light", profile)
+    tree = fz.PointTree(points, np.ones((10, 3)), profile)
+    for gather in (tree.gather, tree.gather_exact):
+        with pytest.raises(ValueError, match="PointTree: positions must be an array of numbers"):
+            gather("here")
+    with pytest.raises(ValueError, match="Ramp: distances must be an array of numbers"):
+        fz.Ramp("near", [[1, 1, 1]])
+    with pytest.raises(ValueError, match="area_compensation: coverage must be an array of numbers"):
+        fz.area_compensation("all", profile)
+    points.areas = np.ones((5, 2))
+    with pytest.raises(ValueError, match=r"PointTree: areas must have shape \(n,\), got 2 dimensions"):
+        fz.PointTree(points, np.ones((10, 3)), profile)
+
+
+@pytest.mark.parametrize("coverage", [np.nan, np.inf, -0.1])
+def test_bad_coverage(coverage):
+    with pytest.raises(ValueError, match="area_compensation: coverage must be >= 0 and finite"):
+        fz.area_compensation([[0.5, coverage, 0.5]], fz.Dipole(MEDIUM))
+
+
+def test_bad_boundaries():
+    for eta in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="fresnel_average: eta must be > 0 and finite"):
+            fz.fresnel_average(eta)
+        with pytest.raises(ValueError, match="fresnel_dielectric: eta must be > 0 and finite"):
+            fz.fresnel_dielectric(0.5, eta)
+    for cos_theta in (-0.1, 1.1, np.nan):
+        with pytest.raises(ValueError, match=r"fresnel_dielectric: cos_theta must be in \[0, 1\]"):
+            fz.fresnel_dielectric(cos_theta, 1.31)
+
+
+def test_nothing_leaves_infinitely_far_away():
+    for kind in (fz.Dipole, fz.BetterDipole, fz.NormalizedDiffusion, fz.PhotonBeamDiffusion, fz.MultipleScattering):
+        assert (kind(MEDIUM).reflectance(np.inf) == 0).all()
+
+
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_hostile_positions(estimator):
     points, profile = sphere(100), fz.Dipole(MEDIUM)
@@ -321,8 +377,9 @@ def test_hostile_positions(estimator):
     assert (out.exitance[1:] == 0).all()
     assert (out.coverage[1:] == 0).all()
     assert tree.gather(np.zeros((0, 3))).exitance.shape == (0, 1, 3)
-    with pytest.raises(ValueError, match="positions must be finite"):
-        tree.gather([[np.nan, 0, 0]])
+    for gather in (tree.gather, tree.gather_exact):
+        with pytest.raises(ValueError, match="PointTree: positions must be finite, got NaN or infinity at row 0"):
+            gather([[np.nan, 0, 0]], estimator=estimator)
     for tolerance in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="tolerance must be > 0"):
             tree.gather([[0, 0, 0]], tolerance=tolerance)

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..tolerance import RENDER_TOLERANCE
 from .checks import checked_resolution, misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
 from .frames import authored_resolution
 from .progress import PROGRESS_KINDS, make_progress
@@ -51,7 +52,7 @@ def bake_command(
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
     ] = 4,
-    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
+    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = RENDER_TOLERANCE,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     progress: Annotated[
         str, typer.Option(metavar="KIND", help="bar, farm (ALF_PROGRESS lines on stdout) or none.")

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..tolerance import RENDER_TOLERANCE
 from ..warning import FrazilWarning
 from .checks import checked_resolution, misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
 from .frames import authored_resolution, fill_pattern, has_pattern, parse_frames
@@ -95,7 +96,7 @@ def render_command(
     bake_bounces: Annotated[
         int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
     ] = 4,
-    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = 0.01,
+    tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = RENDER_TOLERANCE,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[
         str, typer.Option(metavar="NAME", help="Of the EXR: none, rle, zip, zips, piz, pxr24, b44, b44a, dwaa, dwab.")

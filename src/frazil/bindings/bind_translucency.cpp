@@ -28,14 +28,25 @@ Rgb to_rgb(nb::handle value, const char* what) {
     return {three[0], three[1], three[2]};
 }
 
+FloatArray as_floats(nb::handle value, const char* what) {
+    try {
+        return nb::cast<FloatArray>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float32"));
+    } catch (const nb::python_error&) {
+        throw ValueError(str(what, " must be an array of numbers, got ", nb::repr(value.type()).c_str(), "."));
+    }
+}
+
+std::vector<float> to_scalars(nb::handle value, const char* what) {
+    const FloatArray array = as_floats(value, what);
+    if (array.ndim() != 1) throw ValueError(str(what, " must have shape (n,), got ", array.ndim(), " dimensions."));
+    return std::vector<float>(array.data(), array.data() + array.size());
+}
+
 // Radii as (n,) floats; a single number is an array of one.
 std::vector<float> to_radii(nb::handle value, const char* what) {
     float number;
     if (nb::try_cast<float>(value, number)) return {number};
-    const nb::object asarray = nb::module_::import_("numpy").attr("asarray");
-    const auto array = nb::cast<FloatArray>(asarray(value, "float32"));
-    if (array.ndim() != 1) throw ValueError(str(what, " must have shape (n,), got ", array.ndim(), " dimensions."));
-    return std::vector<float>(array.data(), array.data() + array.size());
+    return to_scalars(value, what);
 }
 
 nb::object map_radii(nb::handle value, const char* what, const std::function<Rgb(float)>& f) {
@@ -50,16 +61,6 @@ nb::object map_radii(nb::handle value, const char* what, const std::function<Rgb
     return array_of<float>(std::move(out), {n, 3});
 }
 
-FloatArray as_floats(nb::handle value) {
-    const nb::module_ numpy = nb::module_::import_("numpy");
-    return nb::cast<FloatArray>(numpy.attr("ascontiguousarray")(value, "float32"));
-}
-
-std::vector<float> to_scalars(nb::handle value) {
-    const FloatArray array = as_floats(value);
-    return std::vector<float>(array.data(), array.data() + array.size());
-}
-
 // A PointSet, or anything with positions, normals, areas and spacing.
 PointSet to_points(nb::handle object) {
     PointSet points;
@@ -70,9 +71,9 @@ PointSet to_points(nb::handle object) {
                                  nb::repr(object.type()).c_str(), "."));
         }
     }
-    points.positions = to_vectors3(as_floats(object.attr("positions")), "PointTree: positions");
-    points.normals = to_vectors3(as_floats(object.attr("normals")), "PointTree: normals");
-    points.areas = to_scalars(object.attr("areas"));
+    points.positions = to_vectors3(as_floats(object.attr("positions"), "PointTree: positions"), "PointTree: positions");
+    points.normals = to_vectors3(as_floats(object.attr("normals"), "PointTree: normals"), "PointTree: normals");
+    points.areas = to_scalars(object.attr("areas"), "PointTree: areas");
     if (nb::hasattr(object, "spacing")) points.spacing = nb::cast<float>(object.attr("spacing"));
     return points;
 }
@@ -94,7 +95,7 @@ nb::object per_place(const MeshCells& self, const Value& value) {
 
 // Irradiance (N, 3) or (N, G, 3), and its G.
 std::pair<std::vector<Rgb>, std::size_t> to_irradiance(nb::handle object) {
-    const FloatArray array = as_floats(object);
+    const FloatArray array = as_floats(object, "PointTree: irradiance");
     const std::size_t dimensions = array.ndim();
     if ((dimensions != 2 && dimensions != 3) || array.shape(dimensions - 1) != 3) {
         std::string shape;
@@ -123,7 +124,8 @@ nb::class_<Kind> bind_profile(nb::module_& module, const char* name, const char*
             "reflectance",
             [](const Kind& self, nb::handle r) {
                 const Profile profile(self);
-                return map_radii(r, "reflectance: r", [&](float x) { return reflectance(profile, x); });
+                return map_radii(r, "reflectance: r",
+                                 [&](float x) { return std::isinf(x) ? Rgb(0.0f) : reflectance(profile, x); });
             },
             "r"_a, "Rd(r) in 1/m², (n, 3), for distances r (n,) in metres.")
         .def(
@@ -139,6 +141,11 @@ nb::class_<Kind> bind_profile(nb::module_& module, const char* name, const char*
         .def_prop_ro("medium", [](const Kind& self) { return self.medium; });
 }
 
+void check_index(const char* function, double eta) {
+    if (eta > 0.0 && std::isfinite(eta)) return;
+    throw ValueError(str(function, ": eta must be > 0 and finite, got ", eta, ". From air into ice it is 1.31."));
+}
+
 Profile to_profile(nb::handle object) {
     if (nb::isinstance<Dipole>(object)) return nb::cast<const Dipole&>(object);
     if (nb::isinstance<BetterDipole>(object)) return nb::cast<const BetterDipole&>(object);
@@ -152,9 +159,25 @@ Profile to_profile(nb::handle object) {
 }  // namespace
 
 void bind_translucency(nb::module_& module) {
-    module.def("fresnel_dielectric", &fresnel_dielectric, "cos_theta"_a, "eta"_a,
-               "Reflected fraction of unpolarised light; eta = index it would enter / index it is in.");
-    module.def("fresnel_average", &fresnel_average, "eta"_a, "2 ∫ F(cos) cos dcos: what comes from all around.");
+    module.def(
+        "fresnel_dielectric",
+        [](double cos_theta, double eta) {
+            check_index("fresnel_dielectric", eta);
+            if (!(cos_theta >= 0.0 && cos_theta <= 1.0)) {
+                throw ValueError(str("fresnel_dielectric: cos_theta must be in [0, 1], got ", cos_theta,
+                                     ". It is the cosine between light and normal."));
+            }
+            return fresnel_dielectric(cos_theta, eta);
+        },
+        "cos_theta"_a, "eta"_a,
+        "Reflected fraction of unpolarised light; eta = index it would enter / index it is in.");
+    module.def(
+        "fresnel_average",
+        [](double eta) {
+            check_index("fresnel_average", eta);
+            return fresnel_average(eta);
+        },
+        "eta"_a, "2 ∫ F(cos) cos dcos: what comes from all around.");
 
     nb::class_<Medium>(module, "Medium",
                        "What a translucent body is made of.\n\n"
@@ -246,10 +269,11 @@ void bind_translucency(nb::module_& module) {
             "__init__",
             [](Ramp* self, nb::handle distances, nb::handle colors, bool preserve_energy, double mean_free_path) {
                 if (!(mean_free_path > 0.0 && std::isfinite(mean_free_path))) {
-                    throw ValueError(str("Ramp: mean_free_path must be > 0, got ", mean_free_path, "."));
+                    throw ValueError(
+                        str("Ramp: mean_free_path must be > 0 and finite, got ", mean_free_path, ". It is in metres."));
                 }
-                Ramp ramp{to_radii(distances, "Ramp: distances"), to_vectors3(as_floats(colors), "Ramp: colors"),
-                          preserve_energy};
+                Ramp ramp{to_radii(distances, "Ramp: distances"),
+                          to_vectors3(as_floats(colors, "Ramp: colors"), "Ramp: colors"), preserve_energy};
                 check_ramp(ramp, "Ramp");
                 if (ramp.is_empty()) throw ValueError("Ramp: distances must hold at least one knot, got none.");
                 new (self) Ramp(in_metres(ramp, mean_free_path));
@@ -389,7 +413,8 @@ void bind_translucency(nb::module_& module) {
             "gather",
             [](const PointTree& self, nb::handle positions, float tolerance, const std::string& estimator,
                bool ramp_layers) {
-                const std::vector<V3f> where = to_vectors3(as_floats(positions), "PointTree: positions");
+                const std::vector<V3f> where =
+                    to_vectors3(as_floats(positions, "PointTree: positions"), "PointTree: positions");
                 const GatherOptions options{tolerance, estimator_named(estimator), ramp_layers};
                 nb::gil_scoped_release release;
                 return self.gather(where.data(), where.size(), options);
@@ -404,7 +429,8 @@ void bind_translucency(nb::module_& module) {
         .def(
             "gather_exact",
             [](const PointTree& self, nb::handle positions, const std::string& estimator) {
-                const std::vector<V3f> where = to_vectors3(as_floats(positions), "PointTree: positions");
+                const std::vector<V3f> where =
+                    to_vectors3(as_floats(positions, "PointTree: positions"), "PointTree: positions");
                 const Estimator kind = estimator_named(estimator);
                 nb::gil_scoped_release release;
                 return self.gather_exact(where.data(), where.size(), kind);
@@ -422,9 +448,15 @@ void bind_translucency(nb::module_& module) {
             const Rgb total = albedo(to_profile(profile));
             const Compensation compensation{mode_named(mode), limit, strength, by_luminance};
             check_compensation(compensation, "area_compensation");
-            std::vector<Rgb> gain = to_vectors3(as_floats(coverage), "area_compensation: coverage");
+            std::vector<Rgb> gain =
+                to_vectors3(as_floats(coverage, "area_compensation: coverage"), "area_compensation: coverage");
             const bool is_fill = compensation.mode == CompensationMode::fill;
             for (Rgb& w : gain) {
+                for (int c = 0; c < 3; ++c) {
+                    if (w[c] >= 0.0f && std::isfinite(w[c])) continue;
+                    throw ValueError(str("area_compensation: coverage must be >= 0 and finite, got ", w[c],
+                                         ". Take that of a gather."));
+                }
                 w = is_fill ? fill_amount(compensation, w, total) : compensation_gain(compensation, w, total);
             }
             const std::size_t n = gain.size();

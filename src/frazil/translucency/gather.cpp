@@ -239,9 +239,6 @@ std::vector<KeyedIndex> sorted_positions(const PointTree::Impl& tree, const V3f*
     std::vector<std::size_t> outside((count + grain - 1) / grain, 0);
     parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            if (!is_finite(positions[i])) {
-                throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at row ", i, "."));
-            }
             const bool is_outside = squared_distance(bounds, positions[i]) > reach * reach;
             keys[i] = {is_outside ? kOutside : grid.code(positions[i]) >> kDropped, static_cast<std::uint32_t>(i)};
             outside[begin / grain] += is_outside;
@@ -291,6 +288,7 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     if (options.ramp_layers) out.knots = kernel.ramp.distances.size();
     out.layers.assign(count * out.knots * tree.groups, Rgb(0.0f));
     if (count == 0) return out;
+    check_positions(positions, count);
     const std::vector<KeyedIndex> order = sorted_positions(tree, positions, count);
     if (tree.clusters->nodes.empty()) return out;
 

@@ -41,6 +41,7 @@ Gathered PointTree::gather_exact(const V3f* positions, std::size_t count, Estima
     const Impl& tree = *impl_;
     const PointClusters& clusters = *tree.clusters;
     const TreeKernel& sum = *tree.kernel;
+    check_positions(positions, count);
     Gathered out;
     out.groups = tree.groups;
     out.exitance.assign(count * tree.groups, Rgb(0.0f));

@@ -12,6 +12,8 @@ namespace frazil {
 namespace {
 
 constexpr std::uint32_t kLeafPoints = 10;
+// Metres; squares of distances stay in float's range.
+constexpr float kFarthest = 1e15f;
 
 // By what an extent is shortened so that extent x inverse stays in half's range: cells of slivers, which are long and
 // have no area to speak of.
@@ -48,6 +50,14 @@ void check_points(const PointSet& points, const Cells* cells) {
         for (std::size_t k = begin; k < end; ++k) {
             if (!is_finite(points.positions[k])) {
                 throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at point ", k, "."));
+            }
+            const V3f& p = points.positions[k];
+            if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest) {
+                throw ValueError(str("PointTree: positions must be within ", kFarthest, " m of the origin, got ", p.x,
+                                     ", ", p.y, ", ", p.z, " at point ", k, ". Bring the body nearer."));
+            }
+            if (!is_finite(points.normals[k])) {
+                throw ValueError(str("PointTree: normals must be finite, got NaN or infinity at point ", k, "."));
             }
             if (!(points.areas[k] >= 0.0f && std::isfinite(points.areas[k]))) {
                 throw ValueError(

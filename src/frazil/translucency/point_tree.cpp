@@ -8,6 +8,9 @@
 namespace frazil {
 namespace {
 
+// Between knots of a ramp, of the kernel's reach: a hundredth of a mean free path or less.
+constexpr float kLeastKnotGap = 1e-4f;
+
 // An offset that reaches farther is shortened.
 PowerLean packed_lean(const V3f& offset, float reach) {
     const float longest = std::max(reach, offset.length()), unit = longest > 0.0f ? 32767.0f / longest : 0.0f;
@@ -107,11 +110,27 @@ void sum_power(PointTree::Impl& tree, std::uint32_t n) {
 
 }  // namespace
 
+void check_positions(const V3f* positions, std::size_t count) {
+    parallel_for(count, 8192, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (is_finite(positions[i])) continue;
+            throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at row ", i,
+                                 ". Leave that shading point out."));
+        }
+    });
+}
+
 TreeKernel::TreeKernel(const Profile& of_profile, const Ramp& with_ramp)
     : profile(of_profile),
       ramp(with_ramp),
       ramp_scale(energy_scale(with_ramp, of_profile)),
-      table(tabulate(of_profile)) {}
+      table(tabulate(of_profile)) {
+    // Knots so near that the slope between them, times a distance, is beyond single precision are moved apart.
+    const float least = kLeastKnotGap * table.reach;
+    for (std::size_t k = 1; k < ramp.distances.size(); ++k) {
+        ramp.distances[k] = std::max(ramp.distances[k], ramp.distances[k - 1] + least);
+    }
+}
 
 const std::vector<OpeningRule>& TreeKernel::rules(float tolerance) const {
     const std::lock_guard lock(mutex_);

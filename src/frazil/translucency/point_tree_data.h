@@ -32,6 +32,9 @@ inline float lean_reach(float cell_trace) {
 // rule.
 inline constexpr std::array<double, 4> kDarkness = {1.0, 0.1, 0.01, 0.001};
 
+// ValueError where one of them is not finite.
+void check_positions(const V3f* positions, std::size_t count);
+
 // What a tree sums: a profile and a ramp, tabulated.
 struct TreeKernel {
     Profile profile;
