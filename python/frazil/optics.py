@@ -134,6 +134,8 @@ def to_rgb(spectrum: np.ndarray) -> np.ndarray:
     spectrum = np.asarray(spectrum, float)
     if spectrum.shape != WAVELENGTHS_NM.shape:
         raise ValueError(f"to_rgb: spectrum must have shape {WAVELENGTHS_NM.shape}, got {spectrum.shape}.")
+    if not np.isfinite(spectrum).all():
+        raise ValueError("to_rgb: spectrum must be finite, got NaN or infinity.")
     w = WAVELENGTHS_NM
 
     def lobe(peak: float, below: float, above: float) -> np.ndarray:

@@ -90,6 +90,7 @@ def test_every_medium_makes_a_profile():
         (lambda: optics.impurity_absorption("pollen", 1), "kind must be one of soot, dust, algae"),
         (lambda: optics.ice(1, 1e-4, algae=float("inf")), "mass_fraction must be >= 0"),
         (lambda: optics.to_rgb(np.ones(3)), "spectrum must have shape"),
+        (lambda: optics.to_rgb(np.full(41, np.nan)), "to_rgb: spectrum must be finite"),
     ],
 )
 def test_bad_input(call, message):
