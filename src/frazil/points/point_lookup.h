@@ -29,7 +29,7 @@ class PointLookup {
     // The points' indices in the order of the lookup, in which those near to each other mostly are neighbours.
     std::vector<std::uint32_t> order() const;
 
-    // visit(k, position, normal), once for every point within reach and for some beyond; the point's index is order()[k].
+    // visit(index, k, position, normal), once for every point within reach and for some beyond; index = order()[k].
     template <class Visit>
     void visit(const V3f& position, const Visit& visit) const;
 
@@ -75,7 +75,7 @@ void PointLookup::visit(const V3f& position, const Visit& visit) const {
         if (std::find(done.begin(), done.begin() + count, b) != done.begin() + count) continue;
         done[count++] = b;
         for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
-            visit(k, entries_[k].position, normals_[k]);
+            visit(entries_[k].index, k, entries_[k].position, normals_[k]);
         }
     }
 }

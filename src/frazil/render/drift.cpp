@@ -114,7 +114,7 @@ std::vector<Total> totals_of(const PointSet& places, const PointSet& points, flo
         for (std::size_t k = begin; k < end; ++k) {
             Total& total = totals[k];
             const V3f &place = places.positions[k], &normal = places.normals[k];
-            lookup.visit(place, [&](std::uint32_t point, const V3f& p, const V3f& n) {
+            lookup.visit(place, [&](std::uint32_t point, std::uint32_t, const V3f& p, const V3f& n) {
                 Kernel::Value value;
                 if (!kernel.eval(place, normal, p, n, value)) return;
                 total.weight += value.weight * points.areas[point];
@@ -142,7 +142,7 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
     // these add up to nothing, so that no light is lost.
     parallel_for(n, 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t j = begin; j < end; ++j) {
-            lookup.visit(points.positions[j], [&](std::uint32_t k, const V3f& place, const V3f& normal) {
+            lookup.visit(points.positions[j], [&](std::uint32_t k, std::uint32_t, const V3f& place, const V3f& normal) {
                 Kernel::Value value;
                 if (!kernel.eval(place, normal, points.positions[j], points.normals[j], value)) return;
                 const Total& total = totals[k];

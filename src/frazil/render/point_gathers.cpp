@@ -50,7 +50,7 @@ bool PointGathers::append(const V3f& position, const V3f& normal, Gathered& gath
     const std::size_t groups = at_points_.groups, layers = at_points_.knots * groups;
     const std::size_t row = gathered.coverage.size();
     float sum = 0.0f;
-    lookup_.visit(position, [&](std::uint32_t point, const V3f& p, const V3f& n) {
+    lookup_.visit(position, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
         const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
         if (!(facing > 0.0f && q > 0.0f)) return;
         const float weight = facing * q * q;
