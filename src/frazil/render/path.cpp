@@ -7,15 +7,7 @@
 namespace frazil {
 namespace {
 
-// A path that is worth less than this after a lobe goes on by chance only: after its first lobe, whose layer it alone
-// makes, after further ones, and after the last that are followed whatever they are worth.
-constexpr float kFaintFirst = 0.05f, kFaint = 0.1f, kFaintLate = 1.0f;
-constexpr int kBouncesBeforeLate = 3;
-
-float least_worth(const Path& path) {
-    if (path.scattered > kBouncesBeforeLate) return kFaintLate;
-    return path.bounce > 1 ? kFaint : kFaintFirst;
-}
+constexpr int kBouncesBeforeRoulette = 3;
 
 }  // namespace
 
@@ -274,7 +266,9 @@ bool PathTracer::reflect(Path& path, const Surface& surface, const Shader& shade
     path.light_share = Rgb(1.0f);
 
     // Russian roulette on what the path may still bring.
-    if (!path.survives(path.worth() / least_worth(path))) return false;
+    if (path.scattered > kBouncesBeforeRoulette) {
+        if (!path.survives(path.worth())) return false;
+    }
     path.leave_from(surface.lifted, surface.geometric_normal, wi);
     if (const int filled = interiors_.filling(path.inside); filled != InsideOf::kNone) {
         path.begin_piece(core_at(path, surface, filled, true), bodies_[std::size_t(filled)]->material->volume);

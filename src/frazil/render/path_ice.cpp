@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMaxVolumePieces = 2;  // of a path have their single scattering traced
 // A refracted path that is worth less than this goes on by chance only.
-constexpr float kFaint = 0.1f;
+constexpr float kFaint = 0.02f;
 // Overlays that cover less than this are not seen from below.
 constexpr float kHiding = 0.01f;
 
