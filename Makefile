@@ -116,7 +116,7 @@ quick: test-cpp $(STAMPS)/test ## Run all tests but the slow ones
 	@pytest -m "not slow"
 
 # Left out under sanitizers: cases of many samples, which run the code of others for long.
-LONG_CASES := white furnace*,furnace*,density: the core*,a sphere cut into two*,*of a set*,microfacet albedo*
+LONG_CASES := white furnace*,furnace*,density: the core*,of three bodies*,a sphere cut into two*,*of a set*,microfacet albedo*
 
 sanitize: $(STAMPS)/runtime ## Run the C++ tests under AddressSanitizer and UBSan
 	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \
