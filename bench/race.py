@@ -19,7 +19,9 @@ light diffusely, so that an index-matched boundary is not its model: its bias sh
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -170,17 +172,37 @@ def make_body(folder: Path, triangles: int) -> Path:
     return path
 
 
-def run(python: str, name: str, job: dict, folder: Path, limit: float) -> dict | str:
+def kept_file(cache: Path | None, name: str, job: dict) -> Path | None:
+    """Where a peer's render is kept, by what it is made of; None where it is not."""
+    if cache is None or name.startswith("frazil"):
+        return None
+    cache.mkdir(parents=True, exist_ok=True)
+    settings = json.dumps({key: value for key, value in job.items() if key != "mesh"}, sort_keys=True)
+    key = hashlib.sha256(RENDERERS[name].encode() + settings.encode() + Path(job["mesh"]).read_bytes()).hexdigest()
+    return cache / f"{key}.npz"
+
+
+def run(python: str, name: str, job: dict, folder: Path, options: argparse.Namespace) -> dict | str:
     """One render in its own process; its arrays, or why there are none."""
     out = folder / "out.npz"
     out.unlink(missing_ok=True)
+    kept = kept_file(options.cache, name, job)
+    if kept and kept.exists():
+        shutil.copy(kept, out)
+        return arrays(out)
     command = [python, "-c", RENDERERS[name], json.dumps(job | {"out": str(out)})]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=options.limit)
     except subprocess.TimeoutExpired:
-        return f"more than {limit:.0f} s"
+        return f"more than {options.limit:.0f} s"
     if not out.exists():
         return (done.stderr.strip().splitlines() or [f"exit {done.returncode}"])[-1][:120]
+    if kept:
+        shutil.copy(out, kept)
+    return arrays(out)
+
+
+def arrays(out: Path) -> dict:
     result = dict(np.load(out))
     result["picture"] = result["picture"][..., 0]  # grey media: one channel has it all, and no average over three
     return result
@@ -219,7 +241,7 @@ def race(options: argparse.Namespace, peers_python: str, folder: Path) -> list[d
                 for seed in (1, 2):
                     media = {"sigma_s": sigma_s, "sigma_a": sigma_a, "size": size, "seed": seed, "spp": samples[name]}
                     media["spacing_scale"] = 2.0 if name.endswith("x 2") else 1.0
-                    both.append(run(python, name, job | media, folder, options.limit))
+                    both.append(run(python, name, job | media, folder, options))
                     if isinstance(both[-1], str):
                         break
                 failed = [b for b in both if isinstance(b, str)]
@@ -294,6 +316,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--variant", default="scalar_rgb", help="of Mitsuba: llvm_ad_rgb where its LLVM works")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds a render may take")
     parser.add_argument("--only", nargs="+", choices=list(RENDERERS), default=list(RENDERERS))
+    parser.add_argument("--cache", type=Path, help="folder that keeps the peers' renders: only Frazil's are made anew")
     parser.add_argument("--pictures", type=Path, help="folder for what was rendered")
 
 

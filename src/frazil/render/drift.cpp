@@ -14,7 +14,7 @@ namespace {
 // The kernel's radius: in drift lengths, but so many spacings at least.
 constexpr float kReach = 3.0f, kFewestSpacings = 3.0f;
 // Light is handed on from places so many to the kernel's radius: points that are nearer to each other go together.
-constexpr float kPlaces = 8.0f;
+constexpr float kPlaces = 3.0f;
 // Of facing normals, and of the kernel's reach that lies between the surfaces, at least.
 constexpr float kGap = 0.1f;
 
