@@ -3,7 +3,7 @@
 // Model: E' = E - div(l F): F the flow (lighting/irradiance.h), l the mean way along the surface to the first scattering,
 //   weighted by what leaves again: (1 + mu a'(mu)/a(mu)) sin/sigma_t, a the directional albedo, which is sin/sigma_t where
 //   nothing is absorbed; over all angles 2 a(1)/A - 1 of it. Each point hands its light on along the gradient of what
-//   its neighbours weigh there, by a kernel as wide as light drifts at most.
+//   its neighbours weigh there, by a kernel three times as wide as light drifts.
 // Units: metres, W/m2.
 // Valid: the sum of irradiance times area stays the same; linear in the light; light from all around, whose flow is zero,
 //   stays as it is. The same bits for any number of threads.
