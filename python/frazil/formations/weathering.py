@@ -2,9 +2,9 @@
 
 Model: the solid is refined, rounded (umbrella smoothing, a diffusion of the surface by the square of the radius) and
     displaced along its normals at a middle resolution, then refined to the wanted number of triangles and displaced by
-    the finer features. Refining and displacing keep every edge with its two triangles, so closed solids stay closed.
+    the finer features. Refining and displacing keep every edge with its two triangles, so closed solids stay closed;
+    where a surface would run through itself, in thin tips and along sharp edges, it is moved less.
 Units: metres.
-Not: displacement that would fold the surface: features are meant to be shallow against their size.
 """
 
 from collections.abc import Callable
@@ -14,6 +14,7 @@ import numpy as np
 from manifold3d import Manifold
 from scipy.sparse import coo_matrix
 
+from .._frazil import Mesh, self_intersections
 from .contour import Surface
 from .noise import Noise
 from .solids import arrays_of, solid_of
@@ -23,6 +24,7 @@ Displacement = Callable[[np.ndarray, np.ndarray, float], np.ndarray]  # (points,
 
 kCoarse = 160_000  # triangles at which a surface is rounded and takes its large features
 kMostPasses = 60
+kWithdrawals = (0.5, 0.75, 1.0, 1.0, 1.0)  # how much less a crossing surface is moved, try after try
 
 
 def grow(
@@ -47,9 +49,9 @@ def grow(
     step = _step(surface)
     share = np.ones(len(surface.positions)) if keep is None else keep(surface.positions)
     if rounding > 0.0:
-        _round(surface, rounding, step, share)
+        _move(surface, _rounded(surface, rounding, step, share))
     if large is not None:
-        _displace(surface, large, step, share)
+        _move(surface, _displaced(surface, large, step, share))
     report("surface", 0.3)
     if triangles > 1.3 * kCoarse:
         surface = Surface(*arrays_of(refine(solid_of(surface.positions, surface.triangles), triangles)))
@@ -57,7 +59,7 @@ def grow(
         share = np.ones(len(surface.positions)) if keep is None else keep(surface.positions)
     report("surface", 0.6)
     if fine is not None:
-        _displace(surface, fine, step, share)
+        _move(surface, _displaced(surface, fine, step, share))
     report("surface", 1.0)
     return surface
 
@@ -157,14 +159,32 @@ class Melt:
         return bowls * where
 
 
-def _round(surface: Surface, radius: float, step: float, share: np.ndarray) -> None:
+def _move(surface: Surface, moved: np.ndarray) -> None:
+    """Move the vertices there, less or not at all where the surface would then run through itself."""
+    base, share = surface.positions, np.ones(len(moved))
+    ring = _neighbours(surface)
+    for withdrawal in kWithdrawals:
+        surface.positions = base + share[:, None] * (moved - base)
+        crossing = self_intersections(Mesh(np.float32(surface.positions), np.int32(surface.triangles)))
+        if not len(crossing):
+            return
+        # Its neighbours and theirs follow half and a quarter of the way.
+        reach = np.zeros(len(moved))
+        reach[surface.triangles[crossing]] = 1.0
+        for _ in range(2):
+            reach = np.maximum(reach, 0.5 * (ring @ reach > 0.0) * np.clip(2.0 * (ring @ reach), 0.0, 1.0))
+        share *= 1.0 - withdrawal * reach
+    surface.positions = base + share[:, None] * (moved - base)
+
+
+def _rounded(surface: Surface, radius: float, step: float, share: np.ndarray) -> np.ndarray:
     passes = int(np.clip(np.ceil(2.0 * (radius / step) ** 2), 1, kMostPasses))
     strength = min(1.0, 2.0 * (radius / step) ** 2 / passes) * 0.5
     neighbours = _neighbours(surface)
     p = surface.positions
     for _ in range(passes):
         p = p + (strength * share)[:, None] * (neighbours @ p - p)
-    surface.positions = p
+    return p
 
 
 def _neighbours(surface: Surface):
@@ -179,13 +199,15 @@ def _neighbours(surface: Surface):
     return matrix
 
 
-def _displace(surface: Surface, field: Displacement, step: float, share: np.ndarray) -> None:
+def _displaced(surface: Surface, field: Displacement, step: float, share: np.ndarray) -> np.ndarray:
     normals = surface.vertex_normals()
     share = share * _flatness(surface, normals)
+    moved = surface.positions.copy()
     for begin in range(0, len(normals), 1 << 18):
         part = slice(begin, begin + (1 << 18))
         height = field(surface.positions[part], normals[part], step) * share[part]
-        surface.positions[part] += height[:, None] * normals[part]
+        moved[part] += height[:, None] * normals[part]
+    return moved
 
 
 def _flatness(surface: Surface, normals: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@
 #include "frazil/bindings/bindings.h"
 #include "frazil/geometry/mesh.h"
 #include "frazil/geometry/refinement.h"
+#include "frazil/geometry/self_intersections.h"
 #include "frazil/geometry/subdivision.h"
 
 namespace frazil {
@@ -158,6 +159,22 @@ void bind_control_mesh(nb::module_& module) {
         "Move the vertices by offsets (3F, 3) at the corners of the triangles, their mean at each vertex, and give "
         "the\n"
         "shape its normals. No cracks open.");
+    module.def(
+        "self_intersections",
+        [](const Mesh& mesh) {
+            std::vector<std::int32_t> found;
+            {
+                nb::gil_scoped_release released;
+                found = self_intersections(mesh);
+            }
+            return to_array(std::move(found));
+        },
+        "mesh"_a,
+        "The triangles (N,) int32 that run through another of the mesh: what is inside is not well defined there, and "
+        "light\n"
+        "that goes through such a solid is lost or counted twice. Crossings of less than a thousandth of an edge do "
+        "not\n"
+        "count, nor do triangles that lie flat on each other.");
 }
 
 }  // namespace

@@ -1,41 +1,12 @@
 #include "frazil/geometry/ray_scene.h"
 
 #include <bit>
-#include <cstring>
 
 #include "frazil/base/error.h"
 #include "frazil/geometry/embree.h"
 
 namespace frazil {
 namespace {
-
-// A triangle geometry with its own copy of the vertices, moved by `local_to_world`.
-RTCGeometry make_geometry(const Mesh& mesh, const M44f& local_to_world) {
-    RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 sizeof(V3f), mesh.positions.size()));
-    auto* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(V3i),
-                                            mesh.triangles.size());
-    throw_if_embree_failed("allocating a mesh");
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-        const V3f p = mesh.positions[i] * local_to_world;
-        vertices[3 * i] = p.x, vertices[3 * i + 1] = p.y, vertices[3 * i + 2] = p.z;
-    }
-    std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(V3i));
-    rtcCommitGeometry(geometry);
-    return geometry;
-}
-
-RTCScene make_scene() {
-    RTCScene scene = rtcNewScene(embree_device());
-#if FRAZIL_EMBREE_MAJOR >= 4
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-#else
-    // Embree 3 must know that a query may bring a filter.
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-#endif
-    return scene;
-}
 
 void set_ray(const Ray& ray, RTCRay& out) {
     out.org_x = ray.origin.x, out.org_y = ray.origin.y, out.org_z = ray.origin.z;
@@ -142,7 +113,7 @@ RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         if (uses[i] < 2 || meshes[i].triangles.empty()) continue;
         impl_->prototypes[i] = make_scene();
-        RTCGeometry geometry = make_geometry(meshes[i], M44f());
+        RTCGeometry geometry = make_triangles(meshes[i], M44f());
         rtcAttachGeometry(impl_->prototypes[i], geometry);
         rtcReleaseGeometry(geometry);
         rtcCommitScene(impl_->prototypes[i]);
@@ -157,7 +128,7 @@ RayScene::RayScene(const std::vector<Mesh>& meshes, const std::vector<Placement>
         if (mesh.triangles.empty()) continue;
         RTCScene prototype = impl_->prototypes[placement.mesh];
         if (!prototype) {
-            impl_->attach(make_geometry(mesh, placement.local_to_world), i);
+            impl_->attach(make_triangles(mesh, placement.local_to_world), i);
             continue;
         }
         RTCGeometry instance = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_INSTANCE);
