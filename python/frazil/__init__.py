@@ -50,6 +50,7 @@ from ._frazil import (
     light_groups,
     point_occlusion,
     point_statistics,
+    self_intersections,
     subdivide,
     tessellated_points,
     triangulate,

@@ -143,6 +143,13 @@ def displaced(mesh: Mesh, offsets: numpy.typing.ArrayLike) -> Mesh:
     shape its normals. No cracks open.
     """
 
+def self_intersections(mesh: Mesh) -> NDArray[numpy.int32]:
+    """
+    The triangles (N,) int32 that run through another of the mesh: what is inside is not well defined there, and light
+    that goes through such a solid is lost or counted twice. Crossings of less than a thousandth of an edge do not
+    count, nor do triangles that lie flat on each other.
+    """
+
 class PointSet:
     """
     Points on a mesh that stand for its surface. The arrays are views of the set's own memory.

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+import trimesh
 from pxr import Usd, UsdGeom
 
 import frazil as fz
@@ -64,6 +65,23 @@ def test_bodies_are_closed_and_sheets_say_so(small, name):
         assert np.isfinite(part.positions).all()
         assert len(np.unique(part.triangles)) == len(part.positions), part.name
         assert np.allclose(np.linalg.norm(part.normals, axis=2), 1.0, atol=1e-3), part.name
+
+
+@pytest.mark.parametrize("name", ["spire_cluster", "glacier_front", "iceberg"])
+def test_bodies_do_not_run_through_themselves(name):
+    """Moved all the way, melting folds 8 to 27 % of their triangles through others."""
+    for part in make_formation(name, seed=1, triangles=40_000, age=0.6).parts:
+        mesh = fz.Mesh(part.positions, np.int32(part.triangles))
+        assert len(fz.self_intersections(mesh)) <= 0.002 * len(part.triangles), part.name
+
+
+def test_self_intersections_of_a_mesh_are_its_triangles_indices():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
+    two = trimesh.util.concatenate([ball, ball.copy().apply_translation([1.0, 0.0, 0.0])])
+    found = fz.self_intersections(fz.Mesh(np.float32(two.vertices), np.int32(two.faces)))
+    assert found.dtype == np.int32 and 20 < len(found) < 0.2 * len(two.faces)
+    assert np.abs(two.triangles_center[found][:, 0] - 0.5).max() < 0.15
+    assert len(fz.self_intersections(fz.Mesh(np.float32(ball.vertices), np.int32(ball.faces)))) == 0
 
 
 @pytest.mark.parametrize("name", kNames)

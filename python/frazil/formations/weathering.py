@@ -171,8 +171,8 @@ def _move(surface: Surface, moved: np.ndarray) -> None:
         # Its neighbours and theirs follow half and a quarter of the way.
         reach = np.zeros(len(moved))
         reach[surface.triangles[crossing]] = 1.0
-        for _ in range(2):
-            reach = np.maximum(reach, 0.5 * (ring @ reach > 0.0) * np.clip(2.0 * (ring @ reach), 0.0, 1.0))
+        for share_of_reach in (0.5, 0.25):
+            reach = np.maximum(reach, share_of_reach * (ring @ reach > 0.0))
         share *= 1.0 - withdrawal * reach
     surface.positions = base + share[:, None] * (moved - base)
 

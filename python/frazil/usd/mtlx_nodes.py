@@ -8,6 +8,7 @@ input that they feed keeps its default.
 
 from __future__ import annotations
 
+import abc
 import functools
 import re
 
@@ -24,7 +25,7 @@ _WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant"
 _WIDTHS = {"float": 1, "vector2": 2, "color3": 3, "vector3": 3, "color4": 4, "vector4": 4}
 
 
-class NodeReader:
+class NodeReader(abc.ABC):
     """What evaluate_node asks of a node, wherever it comes from."""
 
     path: str
@@ -36,21 +37,21 @@ class NodeReader:
         """What MaterialX's library says of such a node; None where it has none."""
         return library().getNodeDef(self.id) if self.id else None
 
+    @abc.abstractmethod
     def value(self, name: str):
         """A constant input, or None."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def input(self, name: str) -> Expression | None:
         """What feeds an input, or None."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def upstream(self, name: str):
         """(node, output name) that feeds an input, or None."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def file(self, name: str):
         """(asset, attribute, colour space)."""
-        raise NotImplementedError
 
 
 def node_kind(identifier: str) -> str:

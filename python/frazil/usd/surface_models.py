@@ -193,11 +193,11 @@ class SurfaceModelReader:
         self._definition = library().getNodeDef(self._model.node)
         self._read: list[Expression] = []
         self._fed: dict[str, Expression] = {}
+        self._lost: list[str] = []  # inputs that are not carried over
 
     def read(self):
         """The material, and the primvar of its images."""
         self._warn_of_unknown_inputs()
-        self._lost: list[str] = []
         for names, _, gate in self._model.not_carried:
             if not gate or self._reaches(gate):
                 self._lost += [n.strip() for n in names.split(",") if self._is_changed(n.strip())]

@@ -3,7 +3,7 @@
 //   Embree. Triangles that share a vertex of the edge are not asked: they meet it there.
 // Valid: any mesh that check_mesh takes. Coordinates are single precision, so a crossing counts only where both ends of
 //   the edge are farther from the other's plane than a thousandth of the edge.
-// Not: triangles that lie in one plane on top of each other.
+// Not: triangles that lie in one plane on top of each other. Edges that touch exactly may count.
 #pragma once
 
 #include <cstdint>
