@@ -137,6 +137,7 @@ __all__ = [
     "point_occlusion",
     "match",
     "point_statistics",
+    "self_intersections",
     "poisson_points",
     "read_density",
     "read_ies",
