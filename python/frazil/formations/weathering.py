@@ -162,17 +162,17 @@ class Melt:
 def _move(surface: Surface, moved: np.ndarray) -> None:
     """Move the vertices there, less or not at all where the surface would then run through itself."""
     base, share = surface.positions, np.ones(len(moved))
-    ring = _neighbours(surface)
+    triangles = surface.triangles
     for withdrawal in kWithdrawals:
         surface.positions = base + share[:, None] * (moved - base)
-        crossing = self_intersections(Mesh(np.float32(surface.positions), np.int32(surface.triangles)))
+        crossing = self_intersections(Mesh(np.float32(surface.positions), np.int32(triangles)))
         if not len(crossing):
             return
-        # Its neighbours and theirs follow half and a quarter of the way.
         reach = np.zeros(len(moved))
-        reach[surface.triangles[crossing]] = 1.0
-        for share_of_reach in (0.5, 0.25):
-            reach = np.maximum(reach, share_of_reach * (ring @ reach > 0.0))
+        reach[triangles[crossing]] = 1.0
+        for part in (0.5, 0.25):  # the vertices around follow half of the way, those around these a quarter
+            around = triangles[(reach[triangles] > 0.0).any(axis=1)]
+            reach[around] = np.maximum(reach[around], part)
         share *= 1.0 - withdrawal * reach
     surface.positions = base + share[:, None] * (moved - base)
 
