@@ -5,7 +5,8 @@
 (a) points against pymeshlab, libigl, Open3D and trimesh; (b) gathers against the sum over every point; (c) seconds to a
 picture of equal error against Mitsuba 3 and Cycles; (d) the most memory that each took; (e) growth with the number of
 points and of threads. Writes OUT.md, OUT.json and OUT.png. Without --full sizes are such that it ends in about twenty
-minutes on two idle cores; --full takes a million points for (a), 10^8 points for (e) and four times as many samples of Mitsuba, whose mean is the truth, for (c).
+minutes on two idle cores; --full takes a million points for (a), 10^8 points for (e) and four times as many samples of
+Mitsuba, whose mean is the truth, for (c).
 """
 
 from __future__ import annotations
