@@ -21,7 +21,7 @@ constexpr float kWidestBlock = 4.0f;  // in mean free paths, beyond kBlockStep s
 constexpr std::size_t kChunk = 2048, kLargestChunk = 8192, kChunks = 64;
 constexpr std::size_t kBlockPoints = 128;  // at most
 // Half a block's diagonal that a source is smooth across, over the radius of a cluster that may stand for it, squared.
-constexpr float kSmooth = 0.7f;
+constexpr float kSmooth = 1.0f;
 constexpr float kNothingIsSmooth = std::numeric_limits<float>::max();
 // Of a cluster's largest squared radius, what a single footprint may have before it is cut. Coverage on a plane is the
 // same within 3e-4 from 0.05 to 0.6, at a seventh of the time.

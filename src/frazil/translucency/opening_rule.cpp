@@ -7,9 +7,9 @@ namespace {
 
 // Calibrated on a bunny and a sphere (bench/gather.py): how a tolerance becomes a size, and by how much the size may
 // grow where little of the profile's energy is left.
-constexpr double kSizePerTolerance = 500.0, kSharePower = 0.7, kLargestCubed = 7.0, kRampCaution = 0.4;
+constexpr double kSizePerTolerance = 850.0, kSharePower = 0.2, kLargestCubed = 7.5, kRampCaution = 0.4;
 // How far from r = 0 a profile is as steep as it ever is, over the length of its bend; at most a mean free path.
-constexpr double kLengthPerBend = 1.7;
+constexpr double kLengthPerBend = 1.5;
 // A cluster is never seen from nearer than its radius over this.
 constexpr double kWidest = 0.6;
 
