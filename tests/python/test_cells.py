@@ -175,3 +175,84 @@ def test_bad_input():
         fz.PointTree(points, np.ones((3, 3)), profile, cells=cells)
     with pytest.raises(ValueError, match="PointTree: cells must be one per point"):
         fz.PointTree(fewer, np.ones((len(fewer), 3)), profile, cells=cells)
+
+
+class Loose:
+    """Points of another maker."""
+
+    def __init__(self, points: fz.PointSet):
+        self.positions, self.normals, self.areas = (
+            np.array(values) for values in (points.positions, points.normals, points.areas)
+        )
+        self.spacing = points.spacing
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("positions", np.nan, "Cells: positions must be finite, got NaN or infinity at point 3. Leave"),
+        ("positions", 1e30, "Cells: positions must be within 1e[+]15 m of the origin"),
+        ("normals", np.inf, "Cells: normals must be finite, got NaN or infinity at point 3. Leave"),
+        ("areas", np.nan, "Cells: areas must be >= 0 and finite, got nan at point 3. It is"),
+        ("areas", -1.0, "Cells: areas must be >= 0 and finite, got -1 at point 3. It is"),
+    ],
+)
+def test_points_that_cells_cannot_stand_for(field, value, message):
+    points = Loose(fz.poisson_points(plane(), 0.1))
+    getattr(points, field)[3] = value
+    with pytest.raises(ValueError, match=message):
+        fz.Cells(points, plane())
+
+
+@pytest.mark.parametrize("spacing", [np.nan, np.inf, -1.0, "wide", None])
+@pytest.mark.parametrize("maker", ["Cells", "PointTree"])
+def test_a_bad_spacing_of_points(spacing, maker):
+    points = Loose(fz.poisson_points(plane(), 0.1))
+    points.spacing = spacing
+    light, profile = np.ones((len(points.areas), 3)), fz.Dipole(fz.Medium(1, 1))
+    got = str(spacing).removesuffix(".0")
+    with pytest.raises(ValueError, match=f"{maker}: spacing of the points must be .*, got '?{got}'?[.] It is"):
+        fz.Cells(points, plane()) if maker == "Cells" else fz.PointTree(points, light, profile)
+
+
+def test_points_of_unequal_arrays_have_no_cells():
+    points = Loose(fz.poisson_points(plane(), 0.1))
+    points.normals = points.normals[:2]
+    with pytest.raises(ValueError, match="Cells: points must have a normal and an area each, got .* 2 normals"):
+        fz.Cells(points, plane())
+    points.normals = "up"
+    with pytest.raises(ValueError, match="Cells: normals must be an array of numbers"):
+        fz.Cells(points, plane())
+
+
+@pytest.mark.parametrize("scale", [1e6, 1e15, 1e20])
+def test_a_mesh_far_larger_than_its_points_is_refused_at_once(scale):
+    """Its pieces, as small as a cell, would be more than any memory holds: the process died."""
+    points, mesh = fz.poisson_points(plane(), 0.1), plane()
+    with pytest.raises(ValueError, match="Cells: points must cover the mesh within their spacing"):
+        fz.Cells(points, fz.Mesh(mesh.positions * np.float32(scale), mesh.triangles))
+    tiny = Loose(points)
+    tiny.spacing /= scale
+    with pytest.raises(ValueError, match="Cells: points must cover the mesh within their spacing"):
+        fz.Cells(tiny, mesh)
+
+
+def test_slivers_and_triangles_without_area_have_cells():
+    """A long sliver is as long as its points allow; what has no area is in no cell."""
+    strip = fz.Mesh(
+        np.float32([[0, 0, 0], [100, 0, 0], [100, 0.001, 0], [0, 0.001, 0], [1e6, 0, 0], [2e6, 0, 0]]),
+        np.int32([[0, 1, 2], [0, 2, 3], [0, 4, 5]]),
+    )
+    cells = fz.Cells(fz.poisson_points(strip, 0.5), strip)
+    assert cells.areas.sum() == pytest.approx(0.1, rel=1e-4)
+
+
+def test_normals_of_other_points_are_made_unit_length():
+    points = fz.poisson_points(plane(), 0.1)
+    light, profile = np.ones((len(points), 3)), fz.Dipole(fz.Medium(10, 0.1))
+    straight = fz.PointTree(points, light, profile).gather(points.positions).exitance
+    for scale in (1e-30, 7.0, 1e30):
+        loose = Loose(points)
+        loose.normals = points.normals * scale
+        got = fz.PointTree(loose, light, profile).gather(points.positions).exitance
+        np.testing.assert_allclose(got, straight, rtol=1e-5)

@@ -419,3 +419,17 @@ def test_coarse_points_keep_the_coverage_right_on_average_and_never_negative(spa
     np.testing.assert_allclose(together.mean(axis=0), 1, atol=0.05)
     np.testing.assert_allclose(alone.mean(axis=0), together[:300].mean(axis=0), atol=0.03)
     assert alone.min() >= 0
+
+
+def test_coefficients_beyond_those_of_matter():
+    """Free paths far shorter than light overflowed to NaN."""
+    with pytest.raises(ValueError, match=r"Medium: sigma_s_prime [+] sigma_a must be at most 1e[+]08, got 1e[+]18"):
+        fz.Medium(1e18, 1e-18)
+    with pytest.raises(ValueError, match="Medium: mean_free_path must be at least 1e-08, got 1e-20"):
+        fz.Medium.from_albedo(0.5, 1e-20)
+    points = sphere(10)
+    for profile in (fz.Dipole, fz.BetterDipole, fz.PhotonBeamDiffusion, fz.MultipleScattering):
+        for medium in (fz.Medium(5e7, 5e7), fz.Medium(1e8, 0.0), fz.Medium(1e-30, 1e-30)):
+            out = fz.PointTree(points, np.ones((10, 3)), profile(medium)).gather(points.positions)
+            assert np.isfinite(out.exitance).all()
+            assert (out.exitance >= 0).all()

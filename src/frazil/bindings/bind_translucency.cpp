@@ -23,7 +23,8 @@ Rgb to_rgb(nb::handle value, const char* what) {
     if (nb::try_cast<float>(value, number)) return Rgb(number);
     std::vector<float> three;
     if (!nb::try_cast<std::vector<float>>(value, three) || three.size() != 3) {
-        throw ValueError(str(what, " must be one number or three, got ", nb::repr(value).c_str(), "."));
+        throw ValueError(
+            str(what, " must be one number or three, got ", nb::repr(value).c_str(), ". Three are red, green, blue."));
     }
     return {three[0], three[1], three[2]};
 }
@@ -32,13 +33,15 @@ FloatArray as_floats(nb::handle value, const char* what) {
     try {
         return nb::cast<FloatArray>(nb::module_::import_("numpy").attr("ascontiguousarray")(value, "float32"));
     } catch (const nb::python_error&) {
-        throw ValueError(str(what, " must be an array of numbers, got ", nb::repr(value.type()).c_str(), "."));
+        throw ValueError(str(what, " must be an array of numbers, got ", nb::repr(value.type()).c_str(),
+                             ". Pass what numpy.asarray takes."));
     }
 }
 
 std::vector<float> to_scalars(nb::handle value, const char* what) {
     const FloatArray array = as_floats(value, what);
-    if (array.ndim() != 1) throw ValueError(str(what, " must have shape (n,), got ", array.ndim(), " dimensions."));
+    if (array.ndim() != 1)
+        throw ValueError(str(what, " must have shape (n,), got ", array.ndim(), " dimensions. Reshape the array."));
     return std::vector<float>(array.data(), array.data() + array.size());
 }
 
@@ -61,20 +64,31 @@ nb::object map_radii(nb::handle value, const char* what, const std::function<Rgb
     return array_of<float>(std::move(out), {n, 3});
 }
 
-// A PointSet, or anything with positions, normals, areas and spacing.
-PointSet to_points(nb::handle object) {
+// A PointSet, or anything with positions, normals, areas and spacing; `what` is who asks. Normals are made unit length.
+PointSet to_points(nb::handle object, const std::string& what) {
     PointSet points;
     if (nb::isinstance<PointSet>(object)) return nb::cast<const PointSet&>(object);
     for (const char* name : {"positions", "normals", "areas"}) {
         if (!nb::hasattr(object, name)) {
-            throw ValueError(str("PointTree: points must be a PointSet or have positions, normals and areas, got ",
-                                 nb::repr(object.type()).c_str(), "."));
+            throw ValueError(str(what, ": points must be a PointSet or have positions, normals and areas, got ",
+                                 nb::repr(object.type()).c_str(), ". Make them with poisson_points."));
         }
     }
-    points.positions = to_vectors3(as_floats(object.attr("positions"), "PointTree: positions"), "PointTree: positions");
-    points.normals = to_vectors3(as_floats(object.attr("normals"), "PointTree: normals"), "PointTree: normals");
-    points.areas = to_scalars(object.attr("areas"), "PointTree: areas");
-    if (nb::hasattr(object, "spacing")) points.spacing = nb::cast<float>(object.attr("spacing"));
+    const auto vectors = [&](const char* name) {
+        const std::string field = what + ": " + name;
+        return to_vectors3(as_floats(object.attr(name), field.c_str()), field.c_str());
+    };
+    points.positions = vectors("positions");
+    points.normals = vectors("normals");
+    for (V3f& n : points.normals) {
+        if (is_finite(n)) n = V3f(V3d(n).normalized());
+    }
+    points.areas = to_scalars(object.attr("areas"), (what + ": areas").c_str());
+    if (nb::hasattr(object, "spacing") && !nb::try_cast<double>(object.attr("spacing"), points.spacing)) {
+        throw ValueError(str(what, ": spacing of the points must be a number, got ",
+                             nb::repr(object.attr("spacing")).c_str(),
+                             ". It is the distance of neighbours, in metres."));
+    }
     return points;
 }
 
@@ -100,7 +114,8 @@ std::pair<std::vector<Rgb>, std::size_t> to_irradiance(nb::handle object) {
     if ((dimensions != 2 && dimensions != 3) || array.shape(dimensions - 1) != 3) {
         std::string shape;
         for (std::size_t i = 0; i < dimensions; ++i) shape += str(i ? ", " : "", array.shape(i));
-        throw ValueError(str("PointTree: irradiance must have shape (N, 3) or (N, G, 3), got (", shape, ")."));
+        throw ValueError(
+            str("PointTree: irradiance must have shape (N, 3) or (N, G, 3), got (", shape, "). Reshape the array."));
     }
     const auto* begin = reinterpret_cast<const Rgb*>(array.data());
     return {std::vector<Rgb>(begin, begin + array.size() / 3), dimensions == 3 ? array.shape(1) : 1};
@@ -113,8 +128,8 @@ CompensationMode mode_named(const std::string& name) {
     if (name == "depth") return CompensationMode::depth;
     if (name == "fill") return CompensationMode::fill;
     if (name == "linear") return CompensationMode::linear;
-    throw ValueError(
-        str("area_compensation: mode must be off, ratio, conserve, depth, fill or linear, got '", name, "'."));
+    throw ValueError(str("area_compensation: mode must be off, ratio, conserve, depth, fill or linear, got '", name,
+                         "'. depth is what ice has."));
 }
 
 template <class Kind>
@@ -238,7 +253,8 @@ void bind_translucency(nb::module_& module) {
             "__init__",
             [](MultipleScattering* self, const Medium& medium, double single) {
                 if (!(single >= 0.0 && single <= 1.0)) {
-                    throw ValueError(str("MultipleScattering: single must be in [0, 1], got ", single, "."));
+                    throw ValueError(str("MultipleScattering: single must be in [0, 1], got ", single,
+                                         ". It is a share of the light scattered once."));
                 }
                 new (self) MultipleScattering(medium, single);
             },
@@ -247,10 +263,11 @@ void bind_translucency(nb::module_& module) {
         "half_space_albedo",
         [](double alpha, double eta) {
             if (!(alpha >= 0.0 && alpha <= 1.0)) {
-                throw ValueError(str("half_space_albedo: alpha must be in [0, 1], got ", alpha, "."));
+                throw ValueError(str("half_space_albedo: alpha must be in [0, 1], got ", alpha,
+                                     ". It is the albedo of one scattering."));
             }
             if (!(eta >= 1.0 && eta <= 4.0)) {
-                throw ValueError(str("half_space_albedo: eta must be in [1, 4], got ", eta, "."));
+                throw ValueError(str("half_space_albedo: eta must be in [1, 4], got ", eta, ". Ice is 1.31."));
             }
             const HalfSpaceAlbedo albedo = half_space_albedo(alpha, eta);
             return std::pair{albedo.single, albedo.multiple};
@@ -327,7 +344,7 @@ void bind_translucency(nb::module_& module) {
         .def(
             "__init__",
             [](MeshCells* self, nb::handle points, const Mesh& mesh, int places, std::uint32_t seed) {
-                const PointSet set = to_points(points);
+                const PointSet set = to_points(points, "Cells");
                 const nb::gil_scoped_release release;
                 new (self) MeshCells{mesh, cells_of(set, mesh, places, seed)};
             },
@@ -393,7 +410,7 @@ void bind_translucency(nb::module_& module) {
             "__init__",
             [](PointTree* self, nb::handle points, nb::handle irradiance, nb::handle profile, const Ramp* ramp,
                const MeshCells* cells) {
-                PointSet set = to_points(points);
+                PointSet set = to_points(points, "PointTree");
                 auto [values, groups] = to_irradiance(irradiance);
                 const Profile kind = to_profile(profile);
                 const Ramp shade = ramp ? *ramp : Ramp{};

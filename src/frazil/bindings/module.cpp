@@ -29,7 +29,7 @@ std::vector<V3i> to_indices3(const IntArray& array, const char* what) {
 Estimator estimator_named(const std::string& name) {
     if (name == "noise_free") return Estimator::noise_free;
     if (name == "sum") return Estimator::sum;
-    throw ValueError(str("estimator must be noise_free or sum, got '", name, "'."));
+    throw ValueError(str("estimator must be noise_free or sum, got '", name, "'. noise_free is the default."));
 }
 
 }  // namespace frazil

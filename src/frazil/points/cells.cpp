@@ -20,7 +20,8 @@ constexpr float kLongestEdge = 0.7f, kLongestCoarseEdge = 16.0f;
 constexpr float kLongestPerRoot = 0.75f;
 constexpr std::size_t kPiecesPerCell = 16;  // or a few less
 constexpr std::size_t kPiecesPerChunk = 512;
-constexpr double kMostStretch = 16.0;
+// Spacings may have grown so much; and how many of them a point is looked for (PointLookup::nearest).
+constexpr double kMostStretch = 16.0, kFarthestOwner = 2.0;
 
 // A piece of a triangle: its corners' barycentrics.
 struct Piece {
@@ -122,10 +123,26 @@ void keep_first(std::vector<RankedPlace>& places, std::size_t most) {
     places.resize(kept);
 }
 
+// Whether so many points, each of which covers a disc of this radius at most, may cover the mesh: else its pieces could be
+// any number.
+bool can_be_covered(const Mesh& mesh, std::size_t points, double radius) {
+    double area = 0.0, longest2 = 0.0;
+    for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
+        const Corners corners = corners_of(mesh, t);
+        const double here = 0.5 * (corners.p[1] - corners.p[0]).cross(corners.p[2] - corners.p[0]).length();
+        if (!(here > 0.0)) continue;
+        area += here;
+        longest2 = std::max(longest2, longest_edge(corners.p).first);
+    }
+    const double line = 2.0 * radius * double(points);
+    return area <= kPi * radius * radius * double(points) && longest2 <= line * line;
+}
+
 std::vector<Piece> coarse_pieces(const Mesh& mesh, double longest) {
     std::vector<Piece> pieces;
     for (std::uint32_t t = 0; t < mesh.triangle_count(); ++t) {
         const Corners corners = corners_of(mesh, t);
+        if (!((corners.p[1] - corners.p[0]).cross(corners.p[2] - corners.p[0]).length2() > 0.0)) continue;
         bisect({t, {V2f(0.0f), V2f(1.0f, 0.0f), V2f(0.0f, 1.0f)}}, corners,
                [&](const Piece& piece, const V3d*, double longest2) {
                    if (longest2 > longest * longest) return false;
@@ -228,8 +245,9 @@ Covariance disc_covariance(float area, const V3f& normal) {
 
 Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::uint32_t seed) {
     if (most_places < 1 || most_places > 4096) {
-        throw ValueError(str("Cells: places must be in [1, 4096], got ", most_places, "."));
+        throw ValueError(str("Cells: places must be in [1, 4096], got ", most_places, ". It is how many a cell has."));
     }
+    check_points(points, "Cells");
     const std::size_t n = points.size();
     if (n > 0 && !(points.spacing > 0.0)) {
         throw ValueError(
@@ -242,16 +260,18 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
     cells.first.assign(n + 1, 0);
     if (n == 0) return cells;
 
+    const auto refuse = [&] {
+        throw ValueError(str("Cells: points must cover the mesh within their spacing (", points.spacing,
+                             "), got surface far from all. Make them with poisson_points on this very mesh."));
+    };
+    if (!can_be_covered(mesh, n, kFarthestOwner * kMostStretch * points.spacing)) refuse();
     const std::vector<Piece> pieces = coarse_pieces(mesh, kLongestCoarseEdge * points.spacing);
     std::vector<Chunk> chunks((pieces.size() + kPiecesPerChunk - 1) / kPiecesPerChunk);
     // Points that moved with a mesh that stretched are farther apart than their spacing says: then look farther.
     std::atomic<bool> is_covered{false};
     PointSet looked_at = points;
     for (double stretch = 1.0; !is_covered; stretch *= 2.0) {
-        if (stretch > kMostStretch) {
-            throw ValueError(str("Cells: points must cover the mesh within their spacing (", points.spacing,
-                                 "), got surface far from all. Make them with poisson_points on this very mesh."));
-        }
+        if (stretch > kMostStretch) refuse();
         is_covered = true;
         looked_at.spacing = stretch * points.spacing;
         const PointLookup lookup(looked_at);

@@ -28,4 +28,8 @@ struct PointSet {
 // Make room for `count` points.
 void resize(PointSet& points, std::size_t count);
 
+// ValueError where arrays are of unequal length, positions or normals are not finite, areas or the spacing negative;
+// `object` is who asks.
+void check_points(const PointSet& points, const char* object);
+
 }  // namespace frazil

@@ -43,7 +43,7 @@ void check_compensation(const Compensation& compensation, const std::string& pat
         throw ValueError(str(path, ": limit must be >= 1 and finite, got ", compensation.limit, ". It caps the gain."));
     }
     if (!(compensation.strength >= 0.0f && compensation.strength <= 1.0f)) {
-        throw ValueError(str(path, ": strength must be in [0, 1], got ", compensation.strength, "."));
+        throw ValueError(str(path, ": strength must be in [0, 1], got ", compensation.strength, ". 1 is all of it."));
     }
 }
 

@@ -7,6 +7,12 @@
 #include "frazil/translucency/fresnel.h"
 
 namespace frazil {
+namespace {
+
+// 1/m; a free path of 10 nm is shorter than light. What is computed from it stays in float's range.
+constexpr float kLargestCoefficient = 1e8f;
+
+}  // namespace
 
 void check_medium(const Medium& medium, const std::string& path) {
     for (int c = 0; c < 3; ++c) {
@@ -18,6 +24,10 @@ void check_medium(const Medium& medium, const std::string& path) {
         if (!std::isfinite(absorb) || absorb < 0.0f) {
             throw ValueError(
                 str(path, ": sigma_a must be >= 0 and finite, got ", absorb, ". Absorption is per metre."));
+        }
+        if (scatter + absorb > kLargestCoefficient) {
+            throw ValueError(str(path, ": sigma_s_prime + sigma_a must be at most ", kLargestCoefficient, ", got ",
+                                 scatter + absorb, ". Coefficients are per metre."));
         }
         if (!(scatter + absorb > 0.0f)) {
             throw ValueError(
@@ -41,6 +51,10 @@ Medium medium_from_albedo(const Rgb& albedo, const Rgb& mean_free_path, float et
         if (!(mean_free_path[c] > 0.0f && std::isfinite(mean_free_path[c]))) {
             throw ValueError(
                 str("Medium: mean_free_path must be > 0 and finite, got ", mean_free_path[c], ". It is in metres."));
+        }
+        if (1.0f / mean_free_path[c] > kLargestCoefficient) {
+            throw ValueError(str("Medium: mean_free_path must be at least ", 1.0f / kLargestCoefficient, ", got ",
+                                 mean_free_path[c], ". It is in metres."));
         }
         // Bisect on x = sqrt(1 - alpha'), in which the albedo falls smoothly from 1 to 0.
         double low = 0.0, high = 1.0;

@@ -2,7 +2,7 @@
 // Model: a cluster's mean kernel is exact to second order, so its error grows as (size * bend)³, bend the profile's
 //   relative change per metre; it may be larger the less of the profile's energy lies around its distance.
 // Units: metres.
-// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.14-0.2 % RMS and 1 % at worst, 0.003 0.07 % and 0.3 %.
+// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.13 % RMS and 0.6 % at worst, 0.003 0.04 % and 0.2 %.
 // Not: a bound; it is calibrated.
 #pragma once
 

@@ -12,8 +12,6 @@ namespace frazil {
 namespace {
 
 constexpr std::uint32_t kLeafPoints = 10;
-// Metres; squares of distances stay in float's range.
-constexpr float kFarthest = 1e15f;
 
 // By what an extent is shortened so that extent x inverse stays in half's range: cells of slivers, which are long and
 // have no area to speak of.
@@ -35,36 +33,14 @@ std::array<std::int16_t, 2> packed_normal(const V3f& n) {
     return {static_cast<std::int16_t>(std::lround(x * 32767.0f)), static_cast<std::int16_t>(std::lround(y * 32767.0f))};
 }
 
-void check_points(const PointSet& points, const Cells* cells) {
+void check_sources(const PointSet& points, const Cells* cells) {
     const std::size_t n = points.size();
     if (n == 0) throw ValueError("PointTree: points must not be empty, got 0 points. Choose a smaller spacing.");
-    if (points.areas.size() != n || points.normals.size() != n) {
-        throw ValueError(str("PointTree: points must have a normal and an area each, got ", n, " positions, ",
-                             points.normals.size(), " normals, ", points.areas.size(), " areas."));
-    }
+    check_points(points, "PointTree");
     if (cells && cells->size() != n) {
         throw ValueError(str("PointTree: cells must be one per point (", n, "), got ", cells->size(),
                              ". Make them from these points."));
     }
-    parallel_for(n, 8192, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            if (!is_finite(points.positions[k])) {
-                throw ValueError(str("PointTree: positions must be finite, got NaN or infinity at point ", k, "."));
-            }
-            const V3f& p = points.positions[k];
-            if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kFarthest) {
-                throw ValueError(str("PointTree: positions must be within ", kFarthest, " m of the origin, got ", p.x,
-                                     ", ", p.y, ", ", p.z, " at point ", k, ". Bring the body nearer."));
-            }
-            if (!is_finite(points.normals[k])) {
-                throw ValueError(str("PointTree: normals must be finite, got NaN or infinity at point ", k, "."));
-            }
-            if (!(points.areas[k] >= 0.0f && std::isfinite(points.areas[k]))) {
-                throw ValueError(
-                    str("PointTree: areas must be >= 0 and finite, got ", points.areas[k], " at point ", k, "."));
-            }
-        }
-    });
 }
 
 // The indices of points that are not left out and their Morton codes, sorted by code.
@@ -248,7 +224,7 @@ V3f footprint_normal(const Footprint& footprint) {
 }
 
 PointClusters cluster_points(const PointSet& points, const Cells* cells, const std::vector<char>& is_left_out) {
-    check_points(points, cells);
+    check_sources(points, cells);
     PointClusters tree;
     tree.source_count = points.size();
     tree.spacing = static_cast<float>(points.spacing);

@@ -32,10 +32,12 @@ bool is_light_finite(const std::vector<Rgb>& irradiance, std::size_t point, std:
 }
 
 void check_light(std::size_t points, std::size_t irradiance, std::size_t groups, std::size_t moments) {
-    if (groups == 0) throw ValueError("PointTree: irradiance must have at least one light group, got 0.");
+    if (groups == 0)
+        throw ValueError("PointTree: irradiance must have at least one light group, got 0. Its shape is (N, G, 3).");
     if (irradiance != points * groups) {
         throw ValueError(str("PointTree: irradiance must have one row per point (", points, " x ", groups,
-                             " groups), got ", irradiance, " values."));
+                             " groups), got ", irradiance,
+                             " values. Take it at these points, or at the places of their cells."));
     }
     if (moments > 0 && moments != irradiance) {
         throw ValueError(str("PointTree: moments must be one per irradiance (", irradiance, "), got ", moments, "."));

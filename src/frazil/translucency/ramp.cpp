@@ -10,12 +10,13 @@ namespace frazil {
 void check_ramp(const Ramp& ramp, const std::string& path) {
     if (ramp.colors.size() != ramp.distances.size()) {
         throw ValueError(str(path, ": colors must have one row per distance (", ramp.distances.size(), "), got ",
-                             ramp.colors.size(), "."));
+                             ramp.colors.size(), ". Each knot has one."));
     }
     for (std::size_t k = 0; k < ramp.distances.size(); ++k) {
         const float distance = ramp.distances[k];
         if (!(distance >= 0.0f && std::isfinite(distance))) {
-            throw ValueError(str(path, ": distances must be >= 0 and finite, got ", distance, " at knot ", k, "."));
+            throw ValueError(str(path, ": distances must be >= 0 and finite, got ", distance, " at knot ", k,
+                                 ". It is how far light goes, in metres."));
         }
         if (k > 0 && !(distance > ramp.distances[k - 1])) {
             throw ValueError(str(path, ": distances must increase from knot to knot, got ", distance, " after ",
@@ -23,8 +24,8 @@ void check_ramp(const Ramp& ramp, const std::string& path) {
         }
         for (int c = 0; c < 3; ++c) {
             if (!(ramp.colors[k][c] >= 0.0f && std::isfinite(ramp.colors[k][c]))) {
-                throw ValueError(
-                    str(path, ": colors must be >= 0 and finite, got ", ramp.colors[k][c], " at knot ", k, "."));
+                throw ValueError(str(path, ": colors must be >= 0 and finite, got ", ramp.colors[k][c], " at knot ", k,
+                                     ". It is a factor of the light."));
             }
         }
     }
