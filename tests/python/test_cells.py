@@ -162,6 +162,21 @@ def test_a_render_takes_a_tenth_of_the_points():
     assert rms(sparse[inside], truth[inside]) <= rms(plain[inside], truth[inside])
 
 
+def test_two_places_a_cell_are_as_smooth_as_light_at_the_points():
+    """The fewest that a bake takes, where points are many (kFewestPlaces): with one, edges of shadows are noisier."""
+    setting, count = Setting("plane", plane(), shading=3000), 20000
+    profile = fz.MultipleScattering(fz.Medium(30.0, [0.6, 0.15, 0.05], eta=1.31))
+    exact = {"tolerance": 1e-3}
+    truth = setting.gather("sum", profile, 20 * count, 99, tolerance=exact).exitance
+
+    def error(candidate: str, places: int) -> float:
+        found = (setting.gather(candidate, profile, count, k, places, exact).exitance for k in (1, 2, 3))
+        return float(np.mean([rms(values, truth) for values in found]))
+
+    plain = error("sum", 0)
+    assert error("cell", 2) <= 1.1 * plain < 0.9 * error("cell", 1)
+
+
 def test_bad_input():
     mesh, profile = plane(), fz.Dipole(fz.Medium(1, 1))
     points, fewer = fz.poisson_points(mesh, 0.1), fz.poisson_points(mesh, 0.3)

@@ -23,7 +23,8 @@ constexpr double kDefaultSpacing = 0.5;
 constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
 // Places of a body that the bake keeps at once, 16 bytes each.
 constexpr std::size_t kMostPlaces = 32'000'000;
-constexpr int kFewestPlaces = 2;  // of a cell
+// Of a cell. One is noisier than light at the points; two are not (tests/python/test_cells.py).
+constexpr int kFewestPlaces = 2;
 // Spacing over mean free path beyond which single points show.
 constexpr float kCoarse = 4.0f;
 // How much finer points may be where a texture is dark, which may be black by mistake.
