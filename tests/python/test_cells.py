@@ -12,6 +12,7 @@ import trimesh
 import frazil as fz
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+from gather import Points, irradiance  # noqa: E402
 from noise_free import Setting, measure, plane, rms  # noqa: E402
 
 
@@ -271,3 +272,19 @@ def test_normals_of_other_points_are_made_unit_length():
         loose.normals = points.normals * scale
         got = fz.PointTree(loose, light, profile).gather(points.positions).exitance
         np.testing.assert_allclose(got, straight, rtol=1e-5)
+
+
+def test_light_that_is_dark_among_others_is_as_exact():
+    """Suns from eight sides: where one is dark, all of its light comes from far clusters."""
+    shape = blob(5)
+    shape.apply_scale(2.5)
+    points, places = Points(shape, 100_000, 1), Points(shape, 100_000, 2).positions
+    light = irradiance(points, 8)
+    tree = fz.PointTree(points, light, fz.MultipleScattering(fz.Medium(30.0, (0.6, 0.15, 0.05), eta=1.0)))
+    checked = slice(None, None, 1500)
+    exact = tree.gather_exact(places[checked], "sum")
+    error = 100 * (tree.gather(places, 0.003, "sum").exitance[checked] / exact.exitance - 1)
+    dark = exact.exitance < 0.1 * light.mean(0) * exact.coverage[:, None]
+    assert dark.sum() > 200
+    assert np.sqrt(np.mean(error[dark] ** 2)) < 0.5
+    assert np.abs(error[dark]).max() < 5
