@@ -19,6 +19,8 @@ __all__ = ["check_denoiser", "denoise_film"]
 
 NOISELESS = ("translucency", "emission", "background")
 SEEN_THROUGH = ("refraction", "volume")
+# Of the denoiser, 2.4 times as fast as its best: 1 to 2 % more error in what reflects, 5 % in what is seen through ice.
+QUALITY = "balanced"
 # Of a pixel's light; with less of it the core's own detail, which the denoiser would soften, weighs more.
 MUCH_SEEN_THROUGH = 0.4
 
@@ -55,7 +57,7 @@ def denoise_film(film: Film) -> None:
         for sign in (1.0, -1.0):
             part = np.maximum(sign * layer, 0.0)
             if part.any():
-                result += sign * oidn.denoise(part, **guides, hdr=True, clean_aux=True)
+                result += sign * oidn.denoise(part, **guides, hdr=True, clean_aux=True, quality=QUALITY)
         return result
 
     additive = film.additive_layers()

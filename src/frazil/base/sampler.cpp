@@ -29,13 +29,20 @@ std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
     return reverse_bits(laine_karras(reverse_bits(x), seed));
 }
 
-// The second Sobol dimension, from its Pascal-triangle generator matrix; the first is the bit reversal.
+// The second Sobol dimension; the first is the bit reversal. Its generator matrix, Pascal's triangle modulo 2, is a Kronecker
+// power, so that it takes one step per doubling of the bits [Ahmed2024].
 std::uint32_t sobol_second(std::uint32_t index) {
-    std::uint32_t result = 0;
-    for (std::uint32_t column = 1U << 31; index != 0; index >>= 1, column ^= column >> 1) {
-        if (index & 1U) result ^= column;
-    }
-    return result;
+    std::uint32_t x = reverse_bits(index);
+    x ^= x << 16;
+    x ^= (x & 0x00ff00ffU) << 8;
+    x ^= (x & 0x0f0f0f0fU) << 4;
+    x ^= (x & 0x33333333U) << 2;
+    x ^= (x & 0x55555555U) << 1;
+    return x;
+}
+
+float first_of_pair(std::uint32_t index, std::uint32_t pair_seed) {
+    return to_unit_float(owen_scramble(reverse_bits(index), hash(pair_seed, 1U)));
 }
 
 }  // namespace
@@ -44,15 +51,15 @@ Sampler::Sampler(std::uint32_t seed, std::uint32_t sequence, std::uint32_t sampl
     : sequence_seed_(hash(seed, sequence)), sample_(sample) {}
 
 float Sampler::next_1d() {
-    return next_2d().x;
+    const std::uint32_t pair_seed = hash(sequence_seed_, dimension_++);
+    return first_of_pair(owen_scramble(sample_, pair_seed), pair_seed);
 }
 
 V2f Sampler::next_2d() {
     const std::uint32_t pair_seed = hash(sequence_seed_, dimension_++);
     const std::uint32_t index = owen_scramble(sample_, pair_seed);
-    const std::uint32_t x = owen_scramble(reverse_bits(index), hash(pair_seed, 1U));
     const std::uint32_t y = owen_scramble(sobol_second(index), hash(pair_seed, 2U));
-    return {to_unit_float(x), to_unit_float(y)};
+    return {first_of_pair(index, pair_seed), to_unit_float(y)};
 }
 
 ScrambledNet::ScrambledNet(int count) {

@@ -60,7 +60,9 @@ std::vector<std::uint32_t> PointLookup::order() const {
 }
 
 std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    return hash(std::uint32_t(x), std::uint32_t(y), std::uint32_t(z)) & mask_;
+    // Cells of a block of eight lie side by side: those about a place are in few cache lines.
+    const std::uint32_t block = hash(std::uint32_t(x >> 1), std::uint32_t(y >> 1), std::uint32_t(z >> 1));
+    return (block << 3 | std::uint32_t(x & 1) | std::uint32_t(y & 1) << 1 | std::uint32_t(z & 1) << 2) & mask_;
 }
 
 std::uint32_t PointLookup::bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const {

@@ -240,6 +240,7 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
             body.tree = bodies[leader]->tree;
             body.thickness = bodies[leader]->thickness;
             body.at_points = bodies[leader]->at_points;
+            body.inside = bodies[leader]->inside;
             continue;
         }
         const bool is_alone = !sets.shells(i);
@@ -253,6 +254,7 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
             body.thickness = thickness.of(i);
         }
         body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), groups, plan);
+        if (body.at_points) body.inside = std::make_shared<const InnerGathers>(body, groups, plan.options_for(body));
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();
     }

@@ -15,6 +15,7 @@
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/irradiance.h"
 #include "frazil/material/microfacet.h"
+#include "frazil/render/inner_gathers.h"
 #include "frazil/render/options.h"
 #include "frazil/render/placed_points.h"
 #include "frazil/render/point_gathers.h"
@@ -57,6 +58,7 @@ struct Body {
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
     float spacing = 0.0f;                                     // of its points
     std::shared_ptr<const PointGathers> at_points = nullptr;  // where a render has a use for them
+    std::shared_ptr<const InnerGathers> inside = nullptr;     // beside at_points
 
     // What exitance is scaled by where W is `coverage`; `thin` is one of thickness_gains(), null without.
     Rgb gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const;

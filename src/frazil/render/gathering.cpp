@@ -17,6 +17,9 @@ constexpr float kCell = 0.5f;
 // its tolerance.
 constexpr float kDense = 0.25f;
 
+// Of normals of places that share a blend.
+constexpr float kLeastCosine = 0.9f;
+
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 // What the requests of one body are answered with, and which row each takes.
@@ -59,12 +62,18 @@ std::vector<V3f> shared_places(std::span<const GatherRequest> requests, float ce
     return places;
 }
 
+bool is_close(const GatherRequest& a, const GatherRequest& b, float distance) {
+    return a.pixel == b.pixel && (a.position - b.position).length2() < distance * distance &&
+           a.normal.dot(b.normal) > kLeastCosine;
+}
+
 template <class Value>
 void append(std::vector<Value>& values, const std::vector<Value>& more) {
     values.insert(values.end(), more.begin(), more.end());
 }
 
-// Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest.
+// Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and those
+// of a lattice inside.
 // `places` are those that are gathered here: the first rows.
 Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options,
                     std::vector<V3f>& places) {
@@ -73,17 +82,29 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     Gathered blended;
     std::vector<Rgb> blended_thin;
     std::vector<std::uint32_t> is_blended;
+    std::uint32_t last_seen = kNoRow;  // of the requests that the camera itself makes
     const Medium& medium = body.medium;
     const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     const bool serves_camera = body.spacing <= kDense * mean_free_path && !body.overlay_tree;
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
-        if ((request.is_primary && !serves_camera) || request.normal == V3f(0.0f)) continue;
+        if (request.is_primary && !serves_camera) continue;
+        // What one pixel shows lies close together.
+        if (request.is_primary && last_seen < i && is_close(requests[last_seen], request, kCell * body.spacing)) {
+            answers.row_of[i] = answers.row_of[last_seen];
+            is_blended.push_back(i);
+            continue;
+        }
+        const V3f position = request.position * body.to_points;
         V3f normal;
         body.to_points.multDirMatrix(request.normal, normal);
-        if (!body.at_points->append(request.position * body.to_points, normal, blended, blended_thin)) continue;
-        answers.row_of[i] = static_cast<std::uint32_t>(is_blended.size());
+        if (!body.at_points->append(position, normal, blended, blended_thin)) {
+            if (request.is_primary) continue;
+            body.inside->append(position, blended, blended_thin);
+        }
+        answers.row_of[i] = static_cast<std::uint32_t>(blended.coverage.size() - 1);
         is_blended.push_back(i);
+        if (request.is_primary) last_seen = i;
     }
     places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
     const std::vector<V3f> at_tree = moved(places, body.to_points);

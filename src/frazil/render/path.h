@@ -9,6 +9,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "frazil/base/sampler.h"
@@ -38,8 +39,8 @@ class PathTracer {
                const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
                const MotionVectors* motion = nullptr);
 
-    // What a sample sees first.
-    FirstHit see(const Ray& camera_ray, Tile& tile) const;
+    // What samples of a pixel see first: append to `hits`.
+    void see(std::span<const Ray> camera_rays, std::vector<FirstHit>& hits, Tile& tile) const;
     // Note it in the tile where that is certain before it is shaded: then it may stand for others, and they for it.
     void note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
                     Tile& tile) const;
@@ -67,7 +68,7 @@ class PathTracer {
     void add_direct_light(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
                           Sampler& sampler, Tile& tile) const;
     void add_light_sample(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
-                          const LightSample& sample, Tile& tile) const;
+                          const LightSample& sample, float u_shadow, Tile& tile) const;
     Rgb visibility(const Path& path, int light, const Ray& ray, const InsideOf& inside, Tile& tile,
                    bool& is_straight) const;
     void add_light_beyond(const Path& path, const Surface& surface, const Crossing& crossing, float alpha,

@@ -8,8 +8,9 @@ namespace frazil {
 namespace {
 
 constexpr int kMaxVolumePieces = 2;  // of a path have their single scattering traced
-// A refracted path that is worth less than this goes on by chance only.
-constexpr float kFaint = 0.02f;
+// A refracted path that is worth less goes on by chance only: so much of its light the core gives, without noise. Before it
+// comes to a boundary, where small bright lights may be seen through it, with care; more boldly once they were asked.
+constexpr float kFaint = 0.05f, kFaintBeyond = 0.1f;
 // Overlays that cover less than this are not seen from below.
 constexpr float kHiding = 0.01f;
 
@@ -135,6 +136,7 @@ bool PathTracer::meet_boundary(Path& path, const Surface& surface, const Crossin
     }
     const float alpha = refraction_alpha(ice, surface);
     if (crossing.to == InsideOf::kNone) add_light_beyond(path, surface, crossing, alpha, sampler, tile);
+    if (!path.survives(path.worth() / kFaintBeyond)) return false;
 
     const Frame frame(surface.normal);
     const V3f wo = frame.to_local(-path.ray.direction);

@@ -1,9 +1,31 @@
 // Paths: what lights give them, and what light path expressions keep of it.
+#include <algorithm>
+#include <cmath>
+
 #include "frazil/lighting/shadow.h"
 #include "frazil/render/path.h"
 #include "frazil/render/path_state.h"
 
 namespace frazil {
+namespace {
+
+// What a light is asked for by chance only below: of what a white diffuse surface in front of the camera gets from it.
+constexpr float kFaintLight = 0.02f;
+
+// Multipliers may be negative.
+float magnitude(const Rgb& value) {
+    return std::max(std::abs(value.x), std::max(std::abs(value.y), std::abs(value.z)));
+}
+
+// Whether a light is worth a shadow ray, and what it counts for then; 0 where it is not asked. `brought` is lobes times what
+// they are worth to the camera.
+float shadow_weight(float brought, float u) {
+    const float chance = brought * kPi / kFaintLight;
+    if (chance >= 1.0f) return 1.0f;
+    return u < chance ? 1.0f / chance : 0.0f;
+}
+
+}  // namespace
 
 void PathTracer::add_light(const Path& path, Component component, std::size_t group, const Rgb& radiance,
                            Tile& tile) const {
@@ -88,17 +110,25 @@ void PathTracer::add_direct_light(const Path& path, const Surface& surface, cons
     const float u_pick = sampler.next_1d();
     const LightReceiver receiver{surface.position, surface.horizon, surface.object, path.light_picks()};
     lights_.sample(receiver, u_pick, sampler.next_2d(), samples);
-    for (const LightSample& sample : samples) add_light_sample(path, surface, shader, wo, sample, tile);
+    const float u_shadow = sampler.next_1d();
+    for (const LightSample& sample : samples) add_light_sample(path, surface, shader, wo, sample, u_shadow, tile);
 }
 
 void PathTracer::add_light_sample(const Path& path, const Surface& surface, const Shader& shader, const V3f& wo,
-                                  const LightSample& sample, Tile& tile) const {
+                                  const LightSample& sample, float u_shadow, Tile& tile) const {
     if (!(sample.pdf > 0.0f)) return;
     const Scattering value = shader.eval(wo, sample.direction);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
     Rgb diffuse_lobe = value.diffuse * multiplier(light, LightComponent::diffuse);
     Rgb specular_lobe = value.specular * multiplier(light, LightComponent::specular);
     if (diffuse_lobe == Rgb(0.0f) && specular_lobe == Rgb(0.0f)) return;
+    // Where the path ends here no lobe finds the light.
+    const bool is_last = sample.is_delta || path.scattered >= max_bounces_;
+    const float straight_mis = is_last ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
+    const float brought =
+        magnitude(diffuse_lobe) + magnitude(specular_lobe) * (shader.is_glossy() ? straight_mis : 1.0f);
+    const float asked = shadow_weight(brought * path.worth(), u_shadow);
+    if (asked == 0.0f) return;
 
     Ray shadow;
     shadow.origin = offset_origin(surface.lifted, surface.geometric_normal);
@@ -111,10 +141,8 @@ void PathTracer::add_light_sample(const Path& path, const Surface& surface, cons
     // Through a boundary broad lobes take light along a straight line; what is seen in a glossy one is refracted.
     if (!is_straight && shader.is_glossy()) specular_lobe = Rgb(0.0f);
 
-    // Where the path ends here no lobe finds the light.
-    const bool is_alone = sample.is_delta || !is_straight || path.scattered >= max_bounces_;
-    const float mis = is_alone ? 1.0f : sample.pdf / (sample.pdf + value.pdf);
-    const Rgb light_over_pdf = sample.radiance * visible * (mis / sample.pdf);
+    const float mis = is_straight ? straight_mis : 1.0f;
+    const Rgb light_over_pdf = sample.radiance * visible * (asked * mis / sample.pdf);
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
     Scattering weights{diffuse_lobe, specular_lobe, Rgb(0.0f), 0.0f};
     if (path.bounce > 0) {
@@ -158,13 +186,15 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     const float value =
         inner_transmission(frame.to_local(-path.ray.direction), frame.to_local(sample.direction), alpha, eta);
     if (!(value > 0.0f)) return;
+    const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
+    const float asked = shadow_weight(value * mis * path.worth(), sampler.next_1d());
+    if (asked == 0.0f) return;
 
     const Ray shadow{offset_origin(surface.position, -surface.geometric_normal), sample.direction, 0.0f,
                      sample.distance * (1.0f - 1e-4f)};
     bool is_straight = true;
     const Rgb visible = visibility(path, sample.light, shadow, crossing.beyond, tile, is_straight);
     if (visible == Rgb(0.0f) || !is_straight) return;
-    const float mis = sample.is_delta ? 1.0f : sample.pdf / (sample.pdf + value);
     const Light& light = lights_.lights()[std::size_t(sample.light)];
     if (!path.sees_lamps && !std::holds_alternative<DomeLight>(light.shape)) return;
     Scattering weights = path.weights();
@@ -173,7 +203,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     weights.scale(lobe);
     // Before the first lobe the boundary itself is the first.
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
-    const Rgb radiance = sample.radiance * visible * beyond.light_share * (mis / sample.pdf);
+    const Rgb radiance = sample.radiance * visible * beyond.light_share * (asked * mis / sample.pdf);
     deliver(path, Component::refraction, weights, group, radiance, tile);
     add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light, radiance * lobe, tile);
 }

@@ -18,12 +18,17 @@ FilterSampler::FilterSampler(PixelFilter filter) : filter_(filter) {
         cdf_[i + 1] = static_cast<float>(total);
     }
     for (float& value : cdf_) value /= static_cast<float>(total);
+    for (int i = 0; i < kSize; ++i) first_bin_[i] = static_cast<std::uint8_t>(bin_from(0, float(i) / kSize));
+}
+
+int FilterSampler::bin_from(int bin, float u) const {
+    while (bin + 1 < kSize && !(u < cdf_[bin + 1])) ++bin;
+    return bin;
 }
 
 float FilterSampler::offset(float u) const {
     if (filter_ == PixelFilter::box) return u - 0.5f;
-    const auto above = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, u);
-    const auto bin = static_cast<int>(above - cdf_.begin()) - 1;
+    const int bin = bin_from(first_bin_[static_cast<std::size_t>(u * kSize)], u);
     const float inside = (u - cdf_[bin]) / (cdf_[bin + 1] - cdf_[bin]);
     return kBlackmanHarrisWidth * ((static_cast<float>(bin) + inside) / kSize - 0.5f);
 }

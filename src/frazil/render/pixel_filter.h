@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 namespace frazil {
 
@@ -18,8 +19,12 @@ class FilterSampler {
 
   private:
     static constexpr int kSize = 256;
+    // The bin that u falls into, which is `bin` or comes after it.
+    int bin_from(int bin, float u) const;
+
     PixelFilter filter_;
     std::array<float, kSize + 1> cdf_{};
+    std::array<std::uint8_t, kSize> first_bin_{};  // of u in each of as many equal intervals
 };
 
 }  // namespace frazil

@@ -28,11 +28,16 @@ void add(Rgb* sum, const Rgb* row, std::size_t count, float weight) {
 
 }  // namespace
 
+GatherOptions PointGatherPlan::options_for(const Body& body) const {
+    GatherOptions options = gather;
+    options.ramp_layers = keeps_knots && !body.material->ramp.is_empty();
+    return options;
+}
+
 std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointSet& points, std::size_t groups,
                                                        PointGatherPlan& plan) {
     if (plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points)) return nullptr;
-    GatherOptions options = plan.gather;
-    options.ramp_layers = plan.keeps_knots && !body.material->ramp.is_empty();
+    const GatherOptions options = plan.options_for(body);
     const std::size_t knots = options.ramp_layers ? body.material->ramp.distances.size() : 0;
     const std::size_t bytes = points.size() * bytes_per_point(groups, knots, body.thickness != nullptr);
     if (bytes > plan.bytes) return nullptr;
@@ -50,6 +55,7 @@ bool PointGathers::append(const V3f& position, const V3f& normal, Gathered& gath
     const std::size_t groups = at_points_.groups, layers = at_points_.knots * groups;
     const std::size_t row = gathered.coverage.size();
     float sum = 0.0f;
+    if (normal == V3f(0.0f)) return false;
     lookup_.visit(position, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
         const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
         if (!(facing > 0.0f && q > 0.0f)) return;

@@ -24,6 +24,8 @@ struct PointGatherPlan {
     std::size_t bytes = 0;     // that are left for all bodies
     GatherOptions gather;      // of the render
     bool keeps_knots = false;  // gathers ask for ramp layers where a body has a ramp
+
+    GatherOptions options_for(const Body& body) const;
 };
 
 class PointGathers {

@@ -1,0 +1,102 @@
+#include <doctest/doctest.h>
+
+#include "frazil/base/random.h"
+#include "frazil/points/poisson.h"
+#include "frazil/render/bodies.h"
+#include "frazil/render/inner_gathers.h"
+#include "frazil/render/translucency_sets.h"
+#include "scenes.h"
+#include "shapes.h"
+
+namespace frazil {
+namespace {
+
+// A ball of ice, lit from one side by two groups.
+struct LitBall {
+    Scene scene =
+        test::scene_of(test::sphere(1.0f, 4), test::ice(Rgb(0.1f, 0.3f, 1.0f), 1.31f, 0.2f, CompensationMode::depth));
+    std::vector<std::unique_ptr<Body>> bodies;
+    GatherOptions options;
+
+    explicit LitBall(const Ramp& ramp = {}) {
+        std::get<IceMaterial>(scene.materials[0].model).ramp = ramp;
+        options.ramp_layers = !ramp.is_empty();
+        std::vector<LitPoints> lit(1);
+        lit[0].points = PlacedPoints(poisson_points(scene.meshes[0], 0.025));  // half a mean free path
+        const PointSet points = lit[0].points.in_world();
+        for (const V3f& n : points.normals) {
+            lit[0].irradiance.push_back(Rgb(std::max(0.0f, n.x), 0.2f, n.x > 0.0f ? 1.0f : 0.0f));
+            lit[0].irradiance.push_back(Rgb(std::max(0.0f, -n.y)));
+        }
+        bodies = make_bodies(scene);
+        RenderStats stats;
+        const RayScene ray_scene(scene.meshes, {Placement{}});
+        plant_trees(scene, lit, 2, ray_scene, false, {}, bodies, stats);
+    }
+};
+
+// From just below the surface to some mean free paths deep, on all sides.
+std::vector<V3f> places_inside() {
+    std::vector<V3f> places;
+    for (std::uint32_t i = 0; places.size() < 400; ++i) {
+        const auto coordinate = [&](std::uint32_t axis) { return 2.0f * to_unit_float(hash(i, axis)) - 1.0f; };
+        const V3f place(coordinate(0), coordinate(1), coordinate(2));
+        if (place.length() > 0.75f && place.length() < 0.999f) places.push_back(place);
+    }
+    return places;
+}
+
+struct Rows {
+    Gathered sums;
+    std::vector<Rgb> thin;
+};
+
+Rows interpolated(const InnerGathers& inside, const std::vector<V3f>& places) {
+    Rows rows;
+    for (const V3f& place : places) inside.append(place, rows.sums, rows.thin);
+    return rows;
+}
+
+double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
+    REQUIRE(a.size() == b.size());
+    double difference = 0.0, whole = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        difference += double((a[i] - b[i]).length2());
+        whole += double(b[i].length2());
+    }
+    return std::sqrt(difference / whole);
+}
+
+}  // namespace
+
+TEST_CASE("inner gathers: between the nodes as right there, within a percent") {
+    const LitBall ball(Ramp({0.0f, 0.1f, 0.3f}, {Rgb(1.0f), Rgb(0.5f), Rgb(2.0f)}));
+    const InnerGathers inside(*ball.bodies[0], 2, ball.options);
+    const std::vector<V3f> places = places_inside();
+    const Rows rows = interpolated(inside, places);
+    const Gathered there = ball.bodies[0]->tree->gather(places.data(), places.size(), ball.options);
+    const std::vector<Rgb> thin_there =
+        thickness_gains(ball.bodies[0]->thickness.get(), places.data(), places.size(), ball.options);
+    CHECK(relative_rms(rows.sums.exitance, there.exitance) < 0.01);
+    CHECK(relative_rms(rows.sums.coverage, there.coverage) < 0.01);
+    CHECK(relative_rms(rows.sums.layers, there.layers) < 0.02);
+    CHECK(relative_rms(rows.thin, thin_there) < 0.001);
+    Rgb sum(0.0f), sum_there(0.0f);
+    for (const Rgb& e : rows.sums.exitance) sum += e;
+    for (const Rgb& e : there.exitance) sum_there += e;
+    for (int c = 0; c < 3; ++c) CHECK(sum[c] == doctest::Approx(sum_there[c]).epsilon(0.003));
+}
+
+TEST_CASE("inner gathers: a place's row does not depend on what was asked before") {
+    const LitBall ball;
+    const std::vector<V3f> places = places_inside();
+    const InnerGathers inside(*ball.bodies[0], 2, ball.options), again(*ball.bodies[0], 2, ball.options);
+    const Rows rows = interpolated(inside, places);
+    const Rows reversed = interpolated(again, {places.rbegin(), places.rend()});
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        CHECK(rows.sums.coverage[i] == reversed.sums.coverage[places.size() - 1 - i]);
+        CHECK(rows.thin[i] == reversed.thin[places.size() - 1 - i]);
+    }
+}
+
+}  // namespace frazil
