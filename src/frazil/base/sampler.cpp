@@ -30,7 +30,7 @@ std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
 }
 
 // The second Sobol dimension; the first is the bit reversal. Its generator matrix, Pascal's triangle modulo 2, is a Kronecker
-// power, so that it takes one step per doubling of the bits [Ahmed2024].
+// power, so that it takes one step per doubling of the bits.
 std::uint32_t sobol_second(std::uint32_t index) {
     std::uint32_t x = reverse_bits(index);
     x ^= x << 16;
