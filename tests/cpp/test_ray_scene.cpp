@@ -72,32 +72,3 @@ TEST_CASE("an offset origin does not meet its own surface, near the origin or fa
         CHECK_FALSE(scene.is_occluded({origin, V3f(0.99f, 0.0f, 0.141f).normalized()}));
     }
 }
-
-TEST_CASE("many rays at once hit what each hits alone, instances and what is past the end of a ray included") {
-    const std::vector<Mesh> meshes = {square(), square()};
-    M44f squeezed = moved(0.5f, 0, -1);
-    squeezed[1][1] = -0.5f;
-    const RayScene scene(meshes, {{0, moved(0, 0, 0)}, {1, squeezed}, {1, moved(-0.7f, 0.2f, -2)}});
-    std::vector<Ray> rays;
-    for (int i = 0; i < 37; ++i) {
-        const float x = -1.2f + 0.083f * float(i), y = 0.9f - 0.047f * float(i);
-        rays.push_back({V3f(x, y, 1.0f), V3f(0.05f, 0.02f, -1.0f), 0.0f, i % 5 == 0 ? 0.5f : 9.0f});
-    }
-    std::vector<Hit> hits(rays.size());
-    std::vector<std::uint8_t> is_hit(rays.size(), 7);
-    scene.intersect(rays, hits, is_hit);
-    int met = 0;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-        Hit alone;
-        REQUIRE(is_hit[i] == (scene.intersect(rays[i], alone) ? 1 : 0));
-        if (!is_hit[i]) continue;
-        ++met;
-        CHECK(hits[i].placement == alone.placement);
-        CHECK(hits[i].triangle == alone.triangle);
-        CHECK(hits[i].t == doctest::Approx(alone.t));
-        CHECK(hits[i].uv.x == doctest::Approx(alone.uv.x).epsilon(1e-4));
-        CHECK((hits[i].geometric_normal - alone.geometric_normal).length() < 1e-5f);
-    }
-    CHECK(met > 15);
-    CHECK(met < 33);
-}

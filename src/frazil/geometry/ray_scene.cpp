@@ -19,19 +19,6 @@ void set_ray(const Ray& ray, RTCRay& out) {
     out.flags = 0;
 }
 
-// As many rays as there are, and copies of the first that are not valid.
-template <class Packet, std::size_t kWidth>
-void set_rays(std::span<const Ray> rays, Packet& packet, int (&valid)[kWidth]) {
-    for (std::size_t i = 0; i < kWidth; ++i) {
-        valid[i] = i < rays.size() ? -1 : 0;
-        const Ray& ray = rays[i < rays.size() ? i : 0];
-        packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
-        packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
-        packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
-        packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
-    }
-}
-
 }  // namespace
 
 struct RayScene::Impl {
@@ -63,15 +50,14 @@ struct RayScene::Impl {
         return placement_of_geometry[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
     }
 
-    Hit to_hit(const RTCRayHit& query) const { return to_hit(query.hit, query.ray.tfar); }
-    Hit to_hit(const RTCHit& found, float t) const {
-        const bool is_instance = found.instID[0] != RTC_INVALID_GEOMETRY_ID;
+    Hit to_hit(const RTCRayHit& query) const {
+        const bool is_instance = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
         Hit hit;
-        hit.t = t;
-        hit.placement = placement_of(found.geomID, found.instID[0]);
-        hit.triangle = found.primID;
-        hit.uv = {found.u, found.v};
-        const V3f normal(found.Ng_x, found.Ng_y, found.Ng_z);
+        hit.t = query.ray.tfar;
+        hit.placement = placement_of(query.hit.geomID, query.hit.instID[0]);
+        hit.triangle = query.hit.primID;
+        hit.uv = {query.hit.u, query.hit.v};
+        const V3f normal(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
         if (is_instance) {
             hit.geometric_normal = transform_normal(normal, world_to_local[hit.placement]);
         } else {
@@ -239,39 +225,6 @@ bool RayScene::is_occluded(const Ray& ray) const {
     return query.tfar < 0.0f;
 }
 
-void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits, std::span<std::uint8_t> is_hit) const {
-    constexpr std::size_t kWidth = 16;
-#if FRAZIL_EMBREE_MAJOR >= 4
-    RTCIntersectArguments arguments;
-    rtcInitIntersectArguments(&arguments);
-    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-#else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-#endif
-    for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
-        const std::size_t count = std::min(kWidth, rays.size() - begin);
-        alignas(64) int valid[kWidth];
-        alignas(64) RTCRayHit16 packet;
-        set_rays(rays.subspan(begin, count), packet.ray, valid);
-        for (std::size_t i = 0; i < kWidth; ++i) {
-            packet.hit.geomID[i] = packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-        }
-#if FRAZIL_EMBREE_MAJOR >= 4
-        rtcIntersect16(valid, impl_->top, &packet, &arguments);
-#else
-        rtcIntersect16(valid, impl_->top, &context, &packet);
-#endif
-        for (std::size_t i = 0; i < count; ++i) {
-            is_hit[begin + i] = packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-            if (!is_hit[begin + i]) continue;
-            const RTCHit found = rtcGetHitFromHitN(reinterpret_cast<RTCHitN*>(&packet.hit), kWidth, unsigned(i));
-            hits[begin + i] = impl_->to_hit(found, packet.ray.tfar[i]);
-        }
-    }
-}
-
 void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const {
     constexpr std::size_t kWidth = 8;
 #if FRAZIL_EMBREE_MAJOR >= 4
@@ -285,7 +238,14 @@ void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> o
         const std::size_t count = std::min(kWidth, rays.size() - begin);
         alignas(32) int valid[kWidth];
         alignas(32) RTCRay8 packet;
-        set_rays(rays.subspan(begin, count), packet, valid);
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            valid[i] = i < count ? -1 : 0;
+            const Ray& ray = rays[begin + (i < count ? i : 0)];
+            packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
+            packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
+            packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
+            packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
+        }
 #if FRAZIL_EMBREE_MAJOR >= 4
         rtcOccluded8(valid, impl_->top, &packet, &arguments);
 #else

@@ -73,8 +73,6 @@ class RayScene {
 
     // The nearest hit in (t_min, t_max); false where there is none.
     bool intersect(const Ray& ray, Hit& hit) const;
-    // The same for many rays that follow one another closely, as those of a pixel; is_hit[i] is 1 or 0.
-    void intersect(std::span<const Ray> rays, std::span<Hit> hits, std::span<std::uint8_t> is_hit) const;
     // Whether anything lies in (t_min, t_max).
     bool is_occluded(const Ray& ray) const;
     // The same for many rays at once; faster where rays that follow one another are alike. out[i] is 1 or 0.

@@ -3,8 +3,6 @@
 #include <array>
 #include <bit>
 
-#include "frazil/base/random.h"
-
 namespace frazil {
 
 const std::array<std::array<std::uint8_t, 3>, 27> PointLookup::kNeighbours = [] {
@@ -59,16 +57,6 @@ std::vector<std::uint32_t> PointLookup::order() const {
     return result;
 }
 
-std::uint32_t PointLookup::bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
-    // Cells of a block of eight lie side by side: those about a place are in few cache lines.
-    const std::uint32_t block = hash(std::uint32_t(x >> 1), std::uint32_t(y >> 1), std::uint32_t(z >> 1));
-    return (block << 3 | std::uint32_t(x & 1) | std::uint32_t(y & 1) << 1 | std::uint32_t(z & 1) << 2) & mask_;
-}
-
-std::uint32_t PointLookup::bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const {
-    return bucket(at.cell[0] + neighbour[0] - 1, at.cell[1] + neighbour[1] - 1, at.cell[2] + neighbour[2] - 1);
-}
-
 PointLookup::At PointLookup::locate(const V3f& position) const {
     At at;
     for (int axis = 0; axis < 3; ++axis) {
@@ -83,6 +71,7 @@ PointLookup::At PointLookup::locate(const V3f& position) const {
 std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {
     const At at = locate(position);
     std::uint32_t on_side = kNone, any = kNone;
+    for (const auto& neighbour : kNeighbours) __builtin_prefetch(&first_[bucket(at, neighbour)]);
     // Nothing farther than two cells: distant ones may share a bucket.
     float nearest_on_side = 4.0f * size2_, nearest_any = nearest_on_side;
     for (const auto& neighbour : kNeighbours) {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "frazil/base/random.h"
 #include "frazil/points/point_set.h"
 
 namespace frazil {
@@ -52,8 +53,14 @@ class PointLookup {
     static constexpr float kRoundoff = 1e-3f;
 
     At locate(const V3f& position) const;
-    std::uint32_t bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const;
-    std::uint32_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const;
+    std::uint32_t bucket(const At& at, const std::array<std::uint8_t, 3>& neighbour) const {
+        return bucket(at.cell[0] + neighbour[0] - 1, at.cell[1] + neighbour[1] - 1, at.cell[2] + neighbour[2] - 1);
+    }
+    std::uint32_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
+        // Cells of a block of eight lie side by side: those about a place are in few cache lines.
+        const std::uint32_t block = hash(std::uint32_t(x >> 1), std::uint32_t(y >> 1), std::uint32_t(z >> 1));
+        return (block << 3 | std::uint32_t(x & 1) | std::uint32_t(y & 1) << 1 | std::uint32_t(z & 1) << 2) & mask_;
+    }
 
     V3f origin_ = V3f(0.0f);
     double inverse_size_ = 0.0;  // of cells, 1/m
@@ -67,14 +74,24 @@ class PointLookup {
 template <class Visit>
 void PointLookup::visit(const V3f& position, const Visit& visit) const {
     const At at = locate(position);
-    std::array<std::uint32_t, 27> done;  // buckets that distant cells share are visited once
+    std::array<std::uint32_t, 27> buckets;  // those that distant cells share are visited once
     std::size_t count = 0;
+    // Ask for all of the memory before any of it is waited for.
     for (const auto& neighbour : kNeighbours) {
         if (at.distance2(neighbour) > 1.0f) continue;
         const std::uint32_t b = bucket(at, neighbour);
-        if (std::find(done.begin(), done.begin() + count, b) != done.begin() + count) continue;
-        done[count++] = b;
-        for (std::uint32_t k = first_[b]; k < first_[b + 1]; ++k) {
+        if (std::find(buckets.begin(), buckets.begin() + count, b) != buckets.begin() + count) continue;
+        buckets[count++] = b;
+        __builtin_prefetch(&first_[b]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t first = first_[buckets[i]];
+        if (first == first_[buckets[i] + 1]) continue;
+        __builtin_prefetch(&entries_[first]);
+        __builtin_prefetch(&normals_[first]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        for (std::uint32_t k = first_[buckets[i]]; k < first_[buckets[i] + 1]; ++k) {
             visit(entries_[k].index, k, entries_[k].position, normals_[k]);
         }
     }

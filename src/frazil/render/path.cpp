@@ -33,19 +33,12 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
     }
 }
 
-void PathTracer::see(std::span<const Ray> camera_rays, std::vector<FirstHit>& hits, Tile& tile) const {
-    thread_local std::vector<Hit> found;
-    thread_local std::vector<std::uint8_t> is_hit;
-    found.resize(camera_rays.size());
-    is_hit.resize(camera_rays.size());
-    tile.rays += camera_rays.size();
-    ray_scene_.intersect(camera_rays, found, is_hit);
-    for (std::size_t i = 0; i < camera_rays.size(); ++i) {
-        FirstHit& first = hits.emplace_back();
-        first.ray = camera_rays[i];
-        first.hit = found[i];
-        first.is_hit = is_hit[i] != 0;
-    }
+FirstHit PathTracer::see(const Ray& camera_ray, Tile& tile) const {
+    FirstHit first;
+    first.ray = camera_ray;
+    ++tile.rays;
+    first.is_hit = ray_scene_.intersect(camera_ray, first.hit);
+    return first;
 }
 
 void PathTracer::note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,

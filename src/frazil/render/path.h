@@ -9,7 +9,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "frazil/base/sampler.h"
@@ -39,8 +38,8 @@ class PathTracer {
                const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
                const MotionVectors* motion = nullptr);
 
-    // What samples of a pixel see first: append to `hits`.
-    void see(std::span<const Ray> camera_rays, std::vector<FirstHit>& hits, Tile& tile) const;
+    // What a sample sees first.
+    FirstHit see(const Ray& camera_ray, Tile& tile) const;
     // Note it in the tile where that is certain before it is shaded: then it may stand for others, and they for it.
     void note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
                     Tile& tile) const;
