@@ -81,8 +81,7 @@ void InnerGathers::append(const V3f& position, Gathered& gathered, std::vector<R
         const std::size_t step[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
         float weight = 1.0f;
         for (int axis = 0; axis < 3; ++axis) weight *= step[axis] ? beyond[axis] : 1.0f - beyond[axis];
-        const std::size_t node =
-            ((first[2] + step[2]) * kNodes + first[1] + step[1]) * kNodes + first[0] + step[0];
+        const std::size_t node = ((first[2] + step[2]) * kNodes + first[1] + step[1]) * kNodes + first[0] + step[0];
         for (std::size_t g = 0; g < groups; ++g) {
             gathered.exitance[row * groups + g] += nodes.exitance[node * groups + g] * weight;
         }

@@ -49,7 +49,7 @@ class InnerGathers {
 
     std::shared_ptr<const PointTree> tree_, thickness_;
     GatherOptions options_;
-    double cell_ = 0.0;                     // of the lattice, metres
+    double cell_ = 0.0;                      // of the lattice, metres
     std::size_t most_bricks_per_shelf_ = 0;  // that are kept; the rest is gathered whenever it is asked for
     mutable std::array<Shelf, kShelves> shelves_;
 };
