@@ -1,4 +1,4 @@
-"""What the cathedral takes: a hall of ice, where every path sees ice, as a final picture of 1920 x 1080 with a million points.
+"""What the cathedral takes: a hall of ice where every path sees ice, 1920 x 1080 with a million points.
 
     python bench/cathedral.py [--aovs all] [--part 6] [--samples 64] [--shading-samples 8] [--work out]
 
