@@ -74,7 +74,7 @@ def main() -> None:
     if options.aovs == "all":
         # Mattes are named beside the table's other rows.
         names = [row["name"] for row in aov_table() if "matte" not in row["name"]]
-        layers = ["--aov", ",".join(names), "--matte", "rocks=/World/Rocks"]
+        layers = ["--aov", ",".join(names), "--matte", "rocks=/World/cathedral/Rock1,/World/cathedral/Rock2"]
     wall, processor = run(
         *("frazil", "render", str(scene), "-o", str(picture), "--resolution", f"{width}x{height}"),
         *("--samples", str(options.samples), "--shading-samples", str(options.shading_samples), "--denoise"),
