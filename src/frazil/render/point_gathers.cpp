@@ -28,9 +28,11 @@ void add(Rgb* sum, const Rgb* row, std::size_t count, float weight) {
 
 }  // namespace
 
-std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointSet& points, std::size_t groups,
+std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                        PointGatherPlan& plan) {
-    if (plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points)) return nullptr;
+    const PointSet& points = cloud.points();
+    if (body.surface_tree || plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points))
+        return nullptr;
     GatherOptions options = plan.gather;
     options.ramp_layers = plan.keeps_knots && !body.material->ramp.is_empty();
     const std::size_t knots = options.ramp_layers ? body.material->ramp.distances.size() : 0;
@@ -39,8 +41,9 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     plan.bytes -= bytes;
     plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(points, kReach * static_cast<float>(points.spacing)));
+    const std::vector<V3f> inwards = cloud.inward_positions();
     std::vector<V3f> places;
-    for (const std::uint32_t i : result->lookup_.order()) places.push_back(points.positions[i]);
+    for (const std::uint32_t i : result->lookup_.order()) places.push_back(inwards[i]);
     result->at_points_ = body.tree->gather(places.data(), places.size(), options);
     result->thin_ = thickness_gains(body.thickness.get(), places.data(), places.size(), options);
     return result;
