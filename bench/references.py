@@ -46,6 +46,34 @@ def cube() -> trimesh.Trimesh:
     return turned_box((0.6, 0.6, 0.6), 0.7)
 
 
+def thick() -> trimesh.Trimesh:
+    shape = trimesh.creation.box((1.0, 0.5, 1.0))
+    return shape.apply_transform(trimesh.transformations.rotation_matrix(0.9, (1, 0.3, 0)))
+
+
+def spires(size: int = 97) -> trimesh.Trimesh:
+    """Nine cones of different height and width on a plate, as one closed height field."""
+    x, z = np.meshgrid(*2 * [np.linspace(-0.45, 0.45, size)], indexing="ij")
+    rng = np.random.default_rng(1)
+    height = np.full(x.shape, -0.2)
+    for cell in range(9):
+        at = 0.27 * (np.array([cell % 3, cell // 3]) - 1) + rng.uniform(-0.05, 0.05, 2)
+        top, radius = rng.uniform(0.25, 0.6), rng.uniform(0.06, 0.13)
+        height = np.maximum(height, -0.2 + top * (1 - np.hypot(x - at[0], z - at[1]) / radius))
+    grid = np.arange(size * size).reshape(size, size)
+    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
+    top = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    rim = np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+    low, after = rim + size * size, np.roll(rim, -1)
+    sides = np.concatenate([np.stack((rim, low, after), -1), np.stack((after, low, after + size * size), -1)])
+    floor = np.full(x.shape, -0.3)
+    points = np.concatenate([np.stack((x, y, z), -1).reshape(-1, 3) for y in (height, floor)])
+    shape = trimesh.Trimesh(points, np.concatenate([top, top[:, ::-1] + size * size, sides]), process=False)
+    if shape.volume < 0:
+        shape.invert()
+    return shape
+
+
 def capsule() -> trimesh.Trimesh:
     shape = trimesh.creation.capsule(0.8, 0.08).apply_translation((0, 0, -0.4))
     return shape.apply_transform(trimesh.transformations.rotation_matrix(0.7, (0.3, 1, 0)))
@@ -55,7 +83,7 @@ def capsule() -> trimesh.Trimesh:
 FRONT = ([[1.4, 1.8, 1.2], [0.0, 0.0, 0.0], 0.45, 12.0], 0.4)
 SIDE = ([[2.4, 0.3, -0.3], [0.0, 0.0, 0.0], 0.3, 30.0], 0.1)
 BACK = ([[-0.6, 1.2, -2.0], [0.0, 0.0, 0.0], 0.45, 16.0], 0.2)
-FAINT_BACK = (BACK[0], 0.1)
+FAINT_BACK, FAINT_FRONT, FAINT_SIDE = (BACK[0], 0.1), (FRONT[0], 0.1), (SIDE[0], 0.05)
 
 # Shape, sigma_s_prime and sigma_a in 1/m, light. Albedo from 0.5 to 0.9999, bodies from 4 to 50 mean free paths across.
 SCENES = {
@@ -70,6 +98,10 @@ SCENES = {
     "cube_dark": (cube, (15.0, 21.0, 27.0), (15.0, 9.0, 3.0), FRONT),
     "cube_back": (cube, (19.0, 19.7, 19.98), (1.0, 0.3, 0.02), BACK),
     "capsule_back": (capsule, (27.0, 29.1, 29.85), (3.0, 0.9, 0.15), FAINT_BACK),
+    "thick": (thick, (48.0, 57.0, 59.7), (12.0, 3.0, 0.3), FAINT_FRONT),
+    "thick_dark": (thick, (30.0, 42.0, 54.0), (30.0, 18.0, 6.0), FAINT_SIDE),
+    "spires_dark": (spires, (28.0, 32.0, 36.0), (12.0, 8.0, 4.0), FRONT),
+    "spires_side": (spires, (28.5, 29.4, 29.85), (1.5, 0.6, 0.15), SIDE),
 }
 CAMERA, FOV = [[0.3, 0.5, 2.4], [0.0, 0.0, 0.0]], 30.0
 

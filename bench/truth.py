@@ -32,13 +32,13 @@ def look_at(origin: list[float], target: list[float]) -> np.ndarray:
     return matrix
 
 
-def reference_scene(params: dict, mesh_file: Path, compensation: str) -> fz.Scene:
-    """The reference's scene, made in Python."""
+def reference_scene(params: dict, mesh_file: Path, compensation: str, volume: float = 0.0) -> fz.Scene:
+    """The reference's scene, made in Python; `volume` is how much of the light that is scattered once is traced."""
     shape = trimesh.load(mesh_file, process=False)
     scene = fz.Scene()
     mesh = scene.add_mesh(fz.Mesh(np.asarray(shape.vertices), np.asarray(shape.faces)), f"/{mesh_file.stem}")
     medium = fz.Medium(sigma_s_prime=params["sigma_s_prime"], sigma_a=params["sigma_a"], eta=1.0)
-    ice = scene.add_material("/ice", fz.IceMaterial(medium, compensation=compensation))
+    ice = scene.add_material("/ice", fz.IceMaterial(medium, compensation=compensation, volume=volume))
     scene.add_object(f"/{mesh_file.stem}", mesh, ice)
     scene.add_light(fz.Light(fz.DomeLight(), radiance=params["env"], path="/env"))
     centre, target, half, radiance = params["light"]
@@ -69,6 +69,9 @@ def main() -> None:
     parser.add_argument("--bake-samples", type=int, default=256, help="shadow rays per point and light (default 256)")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=MODES, help="compensations (default: all)")
     parser.add_argument("--bounces", type=int, nargs="+", default=[0, 1, 4], help="bake bounces (default 0 1 4)")
+    parser.add_argument(
+        "--volume", type=float, default=0.0, help="of light that is scattered once, what rays trace (default 0)"
+    )
     parser.add_argument("--out", type=Path, help="folder for an EXR per mode (default: none is written)")
     args = parser.parse_args()
 
@@ -85,7 +88,7 @@ def main() -> None:
     for mode, bounces in itertools.product(args.modes, args.bounces):
         start = time.perf_counter()
         film = fz.render(
-            reference_scene(params, args.mesh, mode),
+            reference_scene(params, args.mesh, mode, args.volume),
             resolution=(width, height),
             samples=args.samples,
             bake_samples=args.bake_samples,

@@ -154,4 +154,74 @@ TEST_CASE("half space: the albedo by angle averages to one, and meets its limits
     }
 }
 
+TEST_CASE("half space: by angle without what is scattered once") {
+    for (const double alpha : {0.5, 0.9, 1.0}) {
+        const DirectionalAlbedo rest(alpha, 1.0, 1.0), all(alpha, 1.0);
+        const HalfSpaceAlbedo plane = half_space_albedo(alpha, 1.0);
+        for (const double mu : {0.1, 0.5, 1.0}) {
+            const double once = 0.5 * alpha * (1.0 - mu * std::log1p(1.0 / mu));
+            CHECK(rest(float(mu)) * plane.multiple + once ==
+                  doctest::Approx(all(float(mu)) * plane.all()).epsilon(2e-3));
+        }
+        // At a slant light is scattered near the surface and leaves at once.
+        CHECK(rest(0.1f) * all(1.0f) < 0.95f * all(0.1f) * rest(1.0f));
+    }
+}
+
+TEST_CASE("drift: a slab has room for the part of the first scattering that takes place in it") {
+    const float sigma_t = 20.0f;
+    for (const float thickness : {1e-3f, 0.03f, 0.2f, 20.0f}) {
+        Mesh mesh;
+        for (const float y : {0.0f, -thickness}) {
+            for (const V2f& p : {V2f(-1.0f, -1.0f), V2f(1.0f, -1.0f), V2f(1.0f, 1.0f), V2f(-1.0f, 1.0f)}) {
+                mesh.positions.emplace_back(1e4f * p.x, y, 1e4f * p.y);
+            }
+        }
+        mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 6, 5}, {4, 7, 6}};
+        const RayScene scene({mesh}, {Placement{}});
+        PointSet points;
+        for (int k = 0; k < 256; ++k) {
+            points.positions.push_back({0.01f * k, 0.0f, 0.0f});
+            points.normals.push_back({0.0f, 1.0f, 0.0f});
+            points.areas.push_back(1.0f);
+        }
+        const Room room = room_of(points, ChordFinder(scene, nullptr, nullptr), sigma_t);
+        double inwards = 0.0, along = 0.0;
+        for (int k = 0; k < 256; ++k) {
+            inwards += room.inwards[k] / 256.0;
+            along += room.along[k] / 256.0;
+        }
+        // (1/sigma_t)(1 - x/(e^x - 1)) is the mean of a free path that is cut off at x.
+        const auto mean_of = [&](double share, double power) {
+            const auto weight = [&](double mu) { return 2.0 * mu * (power == 1.0 ? mu : 1.0 - mu * mu); };
+            const auto within = [&](double mu) {
+                return weight(mu) * first_scattering_within(float(share * sigma_t * thickness / mu));
+            };
+            return integrate_gauss32(within, 0.0, 1.0) / integrate_gauss32(weight, 0.0, 1.0);
+        };
+        CHECK(inwards == doctest::Approx(mean_of(0.5, 1.0)).epsilon(0.02));
+        CHECK(along == doctest::Approx(mean_of(1.0, 2.0)).epsilon(0.02));
+    }
+    CHECK(first_scattering_within(1e3f) == 1.0f);
+    CHECK(first_scattering_within(0.01f) == doctest::Approx(0.005).epsilon(0.01));
+}
+
+TEST_CASE("drift: points with less room hand their light less far on") {
+    const Spot spot;
+    const std::size_t n = spot.points.size();
+    std::vector<Flow> flows(n), halved(n);
+    for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            flows[k][c] = V3f(0.3f * float(k % 7), 0.0f, 0.1f);
+            halved[k][c] = flows[k][c] * 0.5f;
+        }
+    }
+    std::vector<Rgb> roomy(n, Rgb(0.0f)), half(n, Rgb(0.0f)), tight(n, Rgb(0.0f));
+    carry_on(spot.points, flows, Rgb(0.05f), roomy);
+    carry_on(spot.points, halved, Rgb(0.05f), half);
+    carry_on(spot.points, flows, Rgb(0.05f), tight, std::vector<float>(n, 0.5f));
+    CHECK(tight == half);
+    CHECK(tight != roomy);
+}
+
 }  // namespace frazil

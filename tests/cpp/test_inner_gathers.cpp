@@ -31,7 +31,7 @@ struct LitBall {
         bodies = make_bodies(scene);
         RenderStats stats;
         const RayScene ray_scene(scene.meshes, {Placement{}});
-        plant_trees(scene, lit, 2, ray_scene, false, {}, bodies, stats);
+        plant_trees(scene, lit, 2, ray_scene, false, false, {}, bodies, stats);
     }
 };
 

@@ -153,3 +153,31 @@ TEST_CASE("a bake takes over what is known in memory, and bakes the lights that 
     CHECK(grown.bodies[0].irradiance == anew.bodies[0].irradiance);
     CHECK(grown.bodies[0].moments == anew.bodies[0].moments);
 }
+
+TEST_CASE("placed points: clusters and sums stand as far below the surface as there is room") {
+    PointSet points;
+    for (int k = 0; k < 50; ++k) {
+        points.positions.push_back({0.1f * float(k), 2.0f, 0.0f});
+        points.normals.push_back({0.0f, 1.0f, 0.0f});
+        points.areas.push_back(0.01f);
+    }
+    points.spacing = 0.1;
+    PointCloud cloud(points);
+    CHECK(cloud.clusters()->positions.front().y == 2.0f);
+    CHECK(cloud.inward_positions() == points.positions);
+    int made = 0;
+    const auto make = [&] {
+        ++made;
+        return Room{std::vector<float>(50, 0.5f), std::vector<float>(50, 1.0f)};
+    };
+    cloud.add_room(10.0f, 0.2f, make);
+    cloud.add_room(10.0f, 0.2f, make);
+    CHECK(made == 1);
+    for (const V3f& p : cloud.clusters()->positions) CHECK(p.y == doctest::Approx(1.9));
+    for (const V3f& p : cloud.inward_positions()) CHECK(p.y == doctest::Approx(1.9));
+    CHECK(cloud.points().positions.front().y == 2.0f);
+    // Another medium has other room.
+    cloud.add_room(10.0f, 0.4f, make);
+    CHECK(made == 2);
+    for (const V3f& p : cloud.clusters()->positions) CHECK(p.y == doctest::Approx(1.8));
+}

@@ -15,19 +15,20 @@ struct LitBall {
     Scene scene =
         test::scene_of(test::sphere(1.0f, 4), test::ice(Rgb(0.1f, 0.3f, 1.0f), 1.31f, 0.2f, CompensationMode::depth));
     PointSet points = poisson_points(scene.meshes[0], 0.025);  // half a mean free path
+    PlacedPoints placed = PlacedPoints(points);
     std::vector<std::unique_ptr<Body>> bodies;
 
     explicit LitBall(const Ramp& ramp = {}) {
         std::get<IceMaterial>(scene.materials[0].model).ramp = ramp;
         std::vector<LitPoints> lit(1);
-        lit[0].points = PlacedPoints(points);
+        lit[0].points = placed;
         for (const V3f& n : points.normals) {
             lit[0].irradiance.push_back(Rgb(std::max(0.0f, n.x), 0.2f, n.x > 0.0f ? 1.0f : 0.0f));
         }
         bodies = make_bodies(scene);
         RenderStats stats;
         const RayScene ray_scene(scene.meshes, {Placement{}});
-        plant_trees(scene, lit, 1, ray_scene, false, {}, bodies, stats);
+        plant_trees(scene, lit, 1, ray_scene, false, false, {}, bodies, stats);
     }
 };
 
@@ -53,7 +54,7 @@ double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
 TEST_CASE("point gathers: a blend comes within some thousandths of a gather at the place") {
     const LitBall ball(Ramp({0.0f, 0.1f, 0.3f}, {Rgb(1.0f), Rgb(0.5f), Rgb(2.0f)}));
     PointGatherPlan plan = plenty();
-    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, 1, plan);
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, plan);
     REQUIRE(at_points);
     CHECK(plan.bytes < plenty().bytes);
     CHECK(plan.paths == plenty().paths - double(ball.points.size()));
@@ -65,9 +66,12 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
     }
     GatherOptions options;
     options.ramp_layers = true;
-    const Gathered there = ball.bodies[0]->tree->gather(places.positions.data(), places.size(), options);
+    // Rows are of as far below as light is scattered first.
+    std::vector<V3f> below = places.positions;
+    for (std::size_t i = 0; i < below.size(); ++i) below[i] -= places.normals[i] * ball.bodies[0]->depth();
+    const Gathered there = ball.bodies[0]->tree->gather(below.data(), below.size(), options);
     const std::vector<Rgb> thin_there =
-        thickness_gains(ball.bodies[0]->thickness.get(), places.positions.data(), places.size(), options);
+        thickness_gains(ball.bodies[0]->thickness.get(), below.data(), below.size(), options);
     CHECK(relative_rms(blended.exitance, there.exitance) < 0.006);
     CHECK(relative_rms(blended.coverage, there.coverage) < 0.005);
     CHECK(relative_rms(blended.layers, there.layers) < 0.012);
@@ -77,7 +81,7 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
 TEST_CASE("point gathers: no rows off the surface or on its other side") {
     const LitBall ball;
     PointGatherPlan plan = plenty();
-    const auto at_points = PointGathers::make(*ball.bodies[0], ball.points, 1, plan);
+    const auto at_points = PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, plan);
     REQUIRE(at_points);
     Gathered rows;
     std::vector<Rgb> thin;
@@ -112,12 +116,12 @@ TEST_CASE("point gathers: none where paths are few, memory is short or the spaci
     PointGatherPlan few = plenty(), tight = plenty(), plan = plenty();
     few.paths = double(ball.points.size()) - 1.0;
     tight.bytes = 1000;
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, 1, few));
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.points, 1, tight));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, few));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, tight));
     CHECK(tight.bytes == 1000);
     PointSet uneven = ball.points;
     uneven.spacing *= 2.0;
-    CHECK_FALSE(PointGathers::make(*ball.bodies[0], uneven, 1, plan));
+    CHECK_FALSE(PointGathers::make(*ball.bodies[0], PointCloud(uneven), 1, plan));
 }
 
 }  // namespace frazil

@@ -34,10 +34,10 @@ PointSet middle() {
     return points;
 }
 
-Rgb mean_gain(const Mesh& mesh, const Medium& medium, const Rgb& traced_once = Rgb(0.0f)) {
+Rgb mean_gain(const Mesh& mesh, const Medium& medium, float traced = 0.0f, float seen_through = 0.0f) {
     const RayScene scene({mesh}, {Placement{}});
     Rgb sum(0.0f);
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium, traced_once)) sum += gain / 64.0f;
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium, traced, seen_through)) sum += gain / 64.0f;
     return sum;
 }
 
@@ -65,8 +65,7 @@ TEST_CASE("thickness: chords of a closed body end at its own other side, whateve
     const std::vector<std::uint8_t> itself = {1, 0};
     const auto mean = [&](PlacementMask mask) {
         Rgb sum(0.0f);
-        for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 0.0f, nullptr, mask))
-            sum += gain / 64.0f;
+        for (const Rgb& gain : thickness_gain(middle(), scene, medium, 0.0f, 0.0f, nullptr, mask)) sum += gain / 64.0f;
         return sum;
     };
     CHECK(mean(&itself) == mean_gain(slab(0.1f), medium));
@@ -96,13 +95,34 @@ TEST_CASE("thickness: gains grow as the slab gets thinner and never bring more t
     CHECK(last.z > 1.5f);
 }
 
-TEST_CASE("thickness: light of one scattering that rays trace is in neither side of the ratio") {
+TEST_CASE(
+    "thickness: a slab of light that rays trace, scattered once or not, and of the core returns what it did before") {
+    const float thickness = 0.02f;
     const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.0f};
-    const Mesh mesh = slab(0.02f);
-    const Rgb all = mean_gain(mesh, medium), once(0.1f), less = mean_gain(mesh, medium, once);
+    const Mesh mesh = slab(thickness);
+    const Rgb all = mean_gain(mesh, medium), core = mean_gain(mesh, medium, 1.0f, 1.0f);
+    const auto straight = [&](double sigma) {
+        return integrate_gauss32([&](double mu) { return 2.0 * mu * std::exp(-sigma * thickness / mu); }, 0.0, 1.0);
+    };
+    // Light from all around that is scattered once and leaves on either side.
+    const auto once = [&](double sigma) {
+        const auto leaves = [&](double depth) {
+            return integrate_gauss32([&](double mu) { return 0.5 * std::exp(-sigma * depth / mu); }, 0.0, 1.0);
+        };
+        const auto at = [&](double z) {
+            const double arrives =
+                integrate_gauss32([&](double mu) { return 2.0 * std::exp(-sigma * z / mu); }, 0.0, 1.0);
+            return 50.0 * arrives * (leaves(z) + leaves(thickness - z));
+        };
+        return integrate_gauss32(at, 0.0, thickness);
+    };
+    const double white = half_space_albedo(1.0, 1.0).single;
     for (int c = 0; c < 3; ++c) {
-        const float plane = static_cast<float>(half_space_albedo(50.0 / (50.0 + medium.sigma_a[c]), 1.0).all());
-        CHECK(less[c] * (plane - once[c]) == doctest::Approx(all[c] * plane - once[c]).epsilon(1e-4));
+        const double sigma = 50.0 + medium.sigma_a[c];
+        const HalfSpaceAlbedo plane = half_space_albedo(50.0 / sigma, 1.0);
+        const double seen = (1.0 - straight(50.0) - once(50.0)) / (1.0 - white);
+        CHECK(core[c] * plane.multiple * seen + straight(sigma) + once(sigma) ==
+              doctest::Approx(all[c] * plane.all()).epsilon(0.02));
     }
 }
 
@@ -111,8 +131,8 @@ TEST_CASE("thickness: what is seen straight through is not the core's, which kee
     const Medium medium{Rgb(50.0f), Rgb(0.0f, 5.0f, 25.0f), 1.0f};
     const RayScene scene({slab(thickness)}, {Placement{}});
     Rgb all(0.0f), core(0.0f);
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f))) all += gain / 64.0f;
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium, Rgb(0.0f), 1.0f)) core += gain / 64.0f;
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium)) all += gain / 64.0f;
+    for (const Rgb& gain : thickness_gain(middle(), scene, medium, 0.0f, 1.0f)) core += gain / 64.0f;
     CHECK(core.x == doctest::Approx(1.0f).epsilon(1e-4));
     const auto straight = [&](double sigma) {  // 2 E3(sigma thickness): what crosses the slab unscattered
         return integrate_gauss32([&](double mu) { return 2.0 * mu * std::exp(-sigma * thickness / mu); }, 0.0, 1.0);

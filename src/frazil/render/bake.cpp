@@ -3,6 +3,7 @@
 #include <Imath/ImathMatrixAlgo.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "frazil/base/error.h"
@@ -124,7 +125,7 @@ PointSpacing spacing_on(const Scene& scene, const Object& object, float constant
 struct Shape {
     M44f stretch;
     double area;
-    std::map<float, std::shared_ptr<PointCloud>> points;  // by spacing
+    std::map<std::array<float, 3>, std::shared_ptr<PointCloud>> points;  // by spacing and first scattering
 };
 
 class Shapes {
@@ -141,13 +142,13 @@ class Shapes {
     }
 
     // For an object of that shape.
-    PlacedPoints points_of(const Object& object, Shape& shape, float spacing, const RenderOptions& options,
-                           Progress* progress) {
+    PlacedPoints points_of(const Object& object, const Body& body, Shape& shape, float spacing,
+                           const RenderOptions& options, Progress* progress) {
         const M44f to_world = shape.stretch.inverse() * object.local_to_world;
         const PointSpacing wanted = spacing_on(scene_, object, spacing, options);
         if (wanted.anywhere) return {place(object, shape, wanted.anywhere, options, progress), to_world};
         if (!wanted.at_vertices.empty()) return {place(object, shape, wanted.at_vertices, options, progress), to_world};
-        auto& known = shape.points[spacing];
+        auto& known = shape.points[{spacing, body.sigma_t(), body.depth()}];
         if (!known) known = place(object, shape, spacing, options, progress);
         return {known, to_world};
     }
@@ -203,7 +204,7 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
             const float spacing = point_spacing(*bodies[i], shape.area, options);
             const Rgb extinction = bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a;
             coarse.add(object.path, spacing, 1.0f / max_component(extinction));
-            lit[i].points = shapes.points_of(object, shape, spacing, options, progress);
+            lit[i].points = shapes.points_of(object, *bodies[i], shape, spacing, options, progress);
         } catch (const ValueError& error) {
             throw ValueError(str(object.path, ": ", error.what()));
         }
@@ -258,7 +259,9 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         Stopwatch watch(stats.seconds["bake"]);
-        carry_on(lit[i].points.in_world(), lit[i].flows, bodies[i]->drift_length(), lit[i].irradiance);
+        add_room(i, *bodies[i], ray_scene, nullptr, lit[i].points);
+        carry_on(lit[i].points.in_world(), lit[i].flows, bodies[i]->drift_length(), lit[i].irradiance,
+                 lit[i].points.cloud().room_along());
         lit[i].flows = {};
     }
     std::vector<EnteringLight> result(lit.size());

@@ -5,6 +5,7 @@
 #include <optional>
 #include <tuple>
 
+#include "frazil/render/drift.h"
 #include "frazil/render/interior.h"
 #include "frazil/render/stopwatch.h"
 #include "frazil/render/thickness.h"
@@ -21,10 +22,16 @@ double single_albedo(const Medium& medium, int channel) {
     return medium.sigma_s_prime[channel] / (double(medium.sigma_s_prime[channel]) + medium.sigma_a[channel]);
 }
 
-std::shared_ptr<const std::array<DirectionalAlbedo, 3>> directional_albedos(const Medium& medium) {
+std::shared_ptr<const std::array<DirectionalAlbedo, 3>> directional_albedos(const Medium& medium, double less_once) {
     auto result = std::make_shared<std::array<DirectionalAlbedo, 3>>();
-    for (int c = 0; c < 3; ++c) (*result)[c] = DirectionalAlbedo(single_albedo(medium, c), medium.eta);
+    for (int c = 0; c < 3; ++c) (*result)[c] = DirectionalAlbedo(single_albedo(medium, c), medium.eta, less_once);
     return result;
+}
+
+// The cosine inside of a ray outside.
+float cosine_inside(float cos_theta, float eta) {
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)) / eta;
+    return std::sqrt(std::max(0.0f, 1.0f - sine * sine));
 }
 
 }  // namespace
@@ -38,9 +45,12 @@ float Body::transmittance_average(float roughness) const {
 }
 
 Rgb Body::angular_share(float cos_theta) const {
-    const float sine = std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)) / medium.eta;
-    const float mu = std::sqrt(std::max(0.0f, 1.0f - sine * sine));
+    const float mu = cosine_inside(cos_theta, medium.eta);
     return {(*by_angle)[0](mu), (*by_angle)[1](mu), (*by_angle)[2](mu)};
+}
+
+Rgb Body::leaving_share(float cos_theta) const {
+    return angular_share(cos_theta) / (*white_by_angle)(cosine_inside(cos_theta, medium.eta));
 }
 
 V3f Body::drift(const V3f& direction, const V3f& normal) const {
@@ -48,11 +58,21 @@ V3f Body::drift(const V3f& direction, const V3f& normal) const {
     return (direction - normal * direction.dot(normal)) * ((length.x + length.y + length.z) / 3.0f);
 }
 
-float Body::drift_within(float length) const {
+float Body::sigma_t() const {
     const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
-    const float depth = length * (extinction.x + extinction.y + extinction.z) / 3.0f;
-    if (!(depth > 1e-4f)) return 0.0f;
-    return depth < 50.0f ? 1.0f - depth / std::expm1(depth) : 1.0f;
+    return (extinction.x + extinction.y + extinction.z) / 3.0f;
+}
+
+float Body::drift_within(float length) const {
+    return first_scattering_within(length * sigma_t());
+}
+
+float Body::depth() const {
+    // The mean cosine inside of light from all around, in closed form; 2/3 where the boundary does not bend it.
+    const float eta = medium.eta, bent = 1.0f - 1.0f / (eta * eta);
+    const float cosine = 2.0f / 3.0f * eta * eta * (1.0f - bent * std::sqrt(bent));
+    const Rgb length = drift_length() * eta;
+    return cosine * (length.x + length.y + length.z) / 3.0f;
 }
 
 Rgb Body::drift_length() const {
@@ -81,6 +101,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         std::optional<Profile> profile;
         std::shared_ptr<const TreeKernel> kernel, plain_kernel;
         std::shared_ptr<const std::array<DirectionalAlbedo, 3>> by_angle;
+        std::shared_ptr<const DirectionalAlbedo> white_by_angle;
     };
     std::map<std::tuple<const IceMaterial*, bool, float>, Shared> shared;     // by mean density
     std::map<std::pair<const IceMaterial*, std::uint32_t>, float> densities;  // by mesh
@@ -106,19 +127,21 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             is_traced = found->second;
         }
         const double traced = is_traced ? material->volume : 0.0;
-        auto& [profile, kernel, plain_kernel, by_angle] = shared[{material, is_traced, mean}];
+        auto& [profile, kernel, plain_kernel, by_angle, white_by_angle] = shared[{material, is_traced, mean}];
         if (!profile) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
-            const bool lacks_single = traced > 0.0 && lacks_single_scattering(material->profile);
-            by_angle =
-                lacks_single ? std::make_shared<const std::array<DirectionalAlbedo, 3>>() : directional_albedos(medium);
+            const double less_once = lacks_single_scattering(material->profile) ? traced : 0.0;
+            by_angle = directional_albedos(medium, less_once);
+            white_by_angle = std::make_shared<const DirectionalAlbedo>(1.0, medium.eta, less_once);
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
         bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
         bodies[i]->by_angle = by_angle;
+        bodies[i]->white_by_angle = white_by_angle;
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
+        bodies[i]->traced = static_cast<float>(traced);
         bodies[i]->core_scale = Rgb(static_cast<float>(1.0 / (1.0 - traced * white)));
         for (int c = 0; c < 3; ++c) {
             const double alpha = single_albedo(medium, c);
@@ -128,6 +151,15 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
     return bodies;
 }
 
+void add_room(std::size_t object, const Body& body, const RayScene& scene, const Shells* shells,
+              const PlacedPoints& points) {
+    points.cloud().add_room(body.sigma_t(), body.depth(), [&] {
+        std::vector<std::uint8_t> itself(object + 1, 0);
+        itself[object] = 1;
+        return room_of(points.in_world(), ChordFinder(scene, shells, &itself), body.sigma_t());
+    });
+}
+
 Mesh mesh_at_cloud(const Scene& scene, std::size_t object, const PlacedPoints& points) {
     const Object& placed = scene.objects[object];
     return transformed(scene.meshes[placed.mesh], placed.local_to_world * points.to_cloud());
@@ -135,8 +167,9 @@ Mesh mesh_at_cloud(const Scene& scene, std::size_t object, const PlacedPoints& p
 
 std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shared_ptr<const TreeKernel> kernel,
                                            const std::vector<Rgb>& irradiance, std::size_t groups,
-                                           std::vector<V3f> moments) {
-    return std::make_shared<const PointTree>(points.cloud().clusters(), std::move(kernel), irradiance, groups,
+                                           std::vector<V3f> moments, bool is_on_surface) {
+    auto clusters = is_on_surface ? points.cloud().surface_clusters() : points.cloud().clusters();
+    return std::make_shared<const PointTree>(std::move(clusters), std::move(kernel), irradiance, groups,
                                              points.into_cloud(std::move(moments)));
 }
 
@@ -159,7 +192,7 @@ std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     itself[leader] = 1;
     const auto make = [&](PlacementMask mask) {
         return make_tree(points, body.plain_kernel,
-                         thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced_once, seen_through,
+                         thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced, seen_through,
                                         sets_.shells(leader), mask),
                          1);
     };
@@ -173,7 +206,7 @@ std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::siz
                                                                         const GatherOptions& options) {
     const PlacedPoints& points = sets_.points(leader);
     const auto make = [&] {
-        const std::vector<V3f>& positions = points.cloud().points().positions;
+        const std::vector<V3f> positions = points.cloud().inward_positions();
         return std::make_shared<const std::vector<Rgb>>(
             thickness_gains(of(leader).get(), positions.data(), positions.size(), options));
     };
@@ -215,7 +248,7 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
 }
 
 TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
-                             const RayScene& ray_scene, bool wants_depth, PointGatherPlan plan,
+                             const RayScene& ray_scene, bool wants_depth, bool wants_surface, PointGatherPlan plan,
                              std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
                              const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
@@ -238,22 +271,31 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
         body.to_points = sets.points(leader).to_cloud();
         if (!sets.is_leader(i)) {
             body.tree = bodies[leader]->tree;
+            body.surface_tree = bodies[leader]->surface_tree;
             body.thickness = bodies[leader]->thickness;
             body.at_points = bodies[leader]->at_points;
             body.inside = bodies[leader]->inside;
             continue;
         }
         const bool is_alone = !sets.shells(i);
-        body.tree = is_alone
-                        ? make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments)
-                        : make_tree(sets.points(i), body.kernel,
-                                    sets.united(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
-                                    sets.united(i, groups, [&](std::size_t k) { return &lit[k].moments; }));
+        const auto plant = [&](bool is_on_surface) {
+            if (is_alone) {
+                return make_tree(lit[i].points, body.kernel, lit[i].irradiance, groups, lit[i].moments, is_on_surface);
+            }
+            return make_tree(sets.points(i), body.kernel,
+                             sets.united(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
+                             sets.united(i, groups, [&](std::size_t k) { return &lit[k].moments; }), is_on_surface);
+        };
+        body.tree = plant(false);
+        const Compensation& compensation = body.material->compensation;
+        if (wants_surface || !keeps_energy(compensation.mode) || compensation.strength < 1.0f) {
+            body.surface_tree = plant(true);
+        }
         if (is_alone) has_taken(i);
-        if (wants_depth || body.material->compensation.mode == CompensationMode::depth) {
+        if (wants_depth || compensation.mode == CompensationMode::depth) {
             body.thickness = thickness.of(i);
         }
-        body.at_points = PointGathers::make(body, sets.points(i).cloud().points(), groups, plan);
+        body.at_points = PointGathers::make(body, sets.points(i).cloud(), groups, plan);
         if (body.at_points) body.inside = std::make_shared<const InnerGathers>(body, groups, plan.options_for(body));
         stats.points += body.tree->point_count();
         stats.nodes += body.tree->node_count();

@@ -46,15 +46,19 @@ struct Body {
     std::shared_ptr<const TreeKernel> kernel, plain_kernel;  // of the profile, with the material's ramp and without
     Rgb total_reflectance = Rgb(0.0f);                       // Rd_total
     std::shared_ptr<const std::array<DirectionalAlbedo, 3>> by_angle;
+    std::shared_ptr<const DirectionalAlbedo> white_by_angle;  // were nothing absorbed
     // Trees stand where their points do: places are brought there by `to_points`.
     M44f to_points;
-    std::shared_ptr<const PointTree> tree;       // none where the object has no surface; one for a translucency set
+    std::shared_ptr<const PointTree> tree;  // none where the object has no surface; one for a translucency set
+    // The same light on the surface itself, where sums are asked for that are not divided by their coverage.
+    std::shared_ptr<const PointTree> surface_tree;
     std::shared_ptr<const PointTree> thickness;  // ThicknessTrees
     // plant_overlay_trees, where such layers are asked for; which layers its columns are.
     std::shared_ptr<const PointTree> overlay_tree;
     std::vector<std::uint32_t> overlay_layers;
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
+    float traced = 0.0f;  // how much of it
     Rgb traced_once = Rgb(0.0f), core_scale = Rgb(1.0f);
     float spacing = 0.0f;                                     // of its points
     std::shared_ptr<const PointGathers> at_points = nullptr;  // where a render has a use for them
@@ -69,6 +73,8 @@ struct Body {
     // How light that enters or leaves depends on the angle (cosine outside): the directional albedo of a half space of the
     // core, over its mean.
     Rgb angular_share(float cos_theta) const;
+    // As it leaves to a camera, over what a white core would send there: rays find that themselves (cross_interior).
+    Rgb leaving_share(float cos_theta) const;
     // The tangential part of the way to where light that comes along `direction` is scattered first, on the mean, weighted by
     // what leaves again.
     V3f drift(const V3f& direction, const V3f& normal) const;
@@ -76,6 +82,9 @@ struct Body {
     Rgb drift_length() const;
     // What is left of the way where light that is not scattered leaves the body after `length` metres.
     float drift_within(float length) const;
+    // How far inwards that is, on the mean over light from all around.
+    float depth() const;
+    float sigma_t() const;  // mean over channels
 
     // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
     Rgb enters(float cos_theta, float roughness) const;
@@ -94,12 +103,16 @@ struct LitPoints {
     std::vector<Flow> flows = {};   // (N, groups), while light is baked
 };
 
+// Give the points of an object (of a set that it leads, where there are shells) the room that is there for a first scattering.
+void add_room(std::size_t object, const Body& body, const RayScene& scene, const Shells* shells,
+              const PlacedPoints& points);
+
 // The mesh of an object where its points' cloud is.
 Mesh mesh_at_cloud(const Scene& scene, std::size_t object, const PlacedPoints& points);
-// A tree of light on points that stand somewhere; `moments` in the world.
+// A tree of light on points that stand somewhere, as far inwards as there is room or on the surface; `moments` in the world.
 std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shared_ptr<const TreeKernel> kernel,
                                            const std::vector<Rgb>& irradiance, std::size_t groups,
-                                           std::vector<V3f> moments = {});
+                                           std::vector<V3f> moments = {}, bool is_on_surface = false);
 
 class TranslucencySets;
 
@@ -146,12 +159,12 @@ std::vector<Passage> passages_of(const Scene& scene);
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
-// use for it or a layer `wants_depth`; and the gathers at its points, where the plan wants them. `has_taken(i)` is called
+// use for it or a layer `wants_depth`; that of its surface where its compensation has, or a layer `wants_surface`; and the gathers at its points, where the plan wants them. `has_taken(i)` is called
 // when the light of an object is needed no more. Fills points, nodes and seconds of the stats. Returns which bodies share
 // their tree; it refers to what was given.
 TranslucencySets plant_trees(
     const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-    bool wants_depth, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
-    const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});
+    bool wants_depth, bool wants_surface, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
+    RenderStats& stats, const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});
 
 }  // namespace frazil

@@ -40,7 +40,7 @@ Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<R
                      const std::vector<Rgb>& gains, const GatherOptions& options) {
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
     const auto tree = make_tree(points, body.plain_kernel, irradiance, groups);
-    const std::vector<V3f>& positions = points.cloud().points().positions;
+    const std::vector<V3f> positions = points.cloud().inward_positions();
     // Bounces average over many points, and compensation keeps their energy: the plain sum will do.
     Gathered gathered = tree->gather(positions.data(), positions.size(), {options.tolerance, Estimator::sum, false});
     compensate_bounce(body, gains, gathered);

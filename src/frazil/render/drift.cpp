@@ -17,6 +17,7 @@ constexpr float kReach = 3.0f, kFewestSpacings = 3.0f;
 constexpr float kPlaces = 3.0f;
 // Of facing normals, and of the kernel's reach that lies between the surfaces, at least.
 constexpr float kGap = 0.1f;
+constexpr std::uint32_t kSeed = 0x726f6f6dU;
 
 // Where light is handed on from, and how far it drifts on from there, times area: (places, groups).
 struct Sources {
@@ -29,7 +30,8 @@ void add(Flow& sum, const Flow& flow, const Rgb& scale) {
 }
 
 // Points of one cube of this size whose normals lie in the same octant are one place; with size 0 each is its own.
-Sources make_sources(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length, float size) {
+Sources make_sources(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length,
+                     const std::vector<float>& room, float size) {
     using Key = std::array<std::int64_t, 4>;
     const std::size_t n = points.size(), groups = flows.size() / n;
     std::vector<Key> keys(n);
@@ -58,8 +60,9 @@ Sources make_sources(const PointSet& points, const std::vector<Flow>& flows, con
             position += V3d(points.positions[k]) * own;
             normal += V3d(points.normals[k]) * own;
             area += own;
+            const float way = points.areas[k] * (room.empty() ? 1.0f : room[k]);
             for (std::size_t g = 0; g < groups; ++g) {
-                add(sources.drifts[row + g], flows[k * groups + g], length * points.areas[k]);
+                add(sources.drifts[row + g], flows[k * groups + g], length * way);
             }
         }
         if (end - begin == 1) {
@@ -127,14 +130,15 @@ std::vector<Total> totals_of(const PointSet& places, const PointSet& points, flo
 
 }  // namespace
 
-void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length, std::vector<Rgb>& irradiance) {
+void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb& length, std::vector<Rgb>& irradiance,
+              const std::vector<float>& room) {
     const std::size_t n = points.size(), groups = n > 0 ? irradiance.size() / n : 0;
     if (groups == 0) return;
     const float spacing = static_cast<float>(points.spacing);
     const float reach = std::max(kReach * max_component(length), kFewestSpacings * spacing);
     if (!(reach > 0.0f)) return;
     const Sources sources =
-        make_sources(points, flows, length, reach > 1.5f * kPlaces * spacing ? reach / kPlaces : 0.0f);
+        make_sources(points, flows, length, room, reach > 1.5f * kPlaces * spacing ? reach / kPlaces : 0.0f);
     const std::vector<Total> totals = totals_of(sources.places, points, reach);
     const PointLookup lookup(sources.places, reach);
     const Kernel kernel(reach);
@@ -154,6 +158,32 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
             });
         }
     });
+}
+
+float first_scattering_within(float depth) {
+    if (!(depth > 1e-4f)) return 0.0f;
+    return depth < 50.0f ? 1.0f - depth / std::expm1(depth) : 1.0f;
+}
+
+Room room_of(const PointSet& points, const ChordFinder& finder, float sigma_t) {
+    Room room{std::vector<float>(points.size(), 1.0f), std::vector<float>(points.size(), 1.0f)};
+    parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
+        std::vector<Chord> chords;
+        for (std::size_t k = begin; k < end; ++k) {
+            finder.find(points, k, kSeed, chords);
+            float inwards = 0.0f, along = 0.0f, cosines = 0.0f, squares = 0.0f;
+            for (const Chord& chord : chords) {
+                const float square = 1.0f - chord.cosine * chord.cosine;
+                cosines += chord.cosine;
+                squares += square;
+                inwards += chord.cosine * first_scattering_within(0.5f * sigma_t * chord.length);
+                along += square * first_scattering_within(sigma_t * chord.length);
+            }
+            room.inwards[k] = inwards / cosines;
+            room.along[k] = along / squares;
+        }
+    });
+    return room;
 }
 
 }  // namespace frazil

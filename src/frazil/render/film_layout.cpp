@@ -179,6 +179,11 @@ bool FilmLayout::has(std::string_view aov) const {
     return std::find(aovs.begin(), aovs.end(), aov) != aovs.end();
 }
 
+bool FilmLayout::needs_surface() const {
+    return has("compensation_factor") ||
+           std::any_of(modes.begin(), modes.end(), [](CompensationMode mode) { return !keeps_energy(mode); });
+}
+
 bool FilmLayout::has_mode(CompensationMode mode) const {
     return std::find(modes.begin(), modes.end(), mode) != modes.end();
 }

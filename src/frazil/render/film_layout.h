@@ -69,6 +69,7 @@ struct FilmLayout {
     bool has_mode(CompensationMode mode) const;
     bool needs_fill() const { return has_mode(CompensationMode::fill); }    // light that enters at shading points
     bool needs_depth() const { return has_mode(CompensationMode::depth); }  // the thickness of bodies
+    bool needs_surface() const;                                             // sums on the surface of bodies itself
 
     // Layer names: of a component or plane, and of one of its light groups.
     std::string plane_name(std::size_t plane) const;

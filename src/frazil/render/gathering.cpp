@@ -24,8 +24,8 @@ constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 // What the requests of one body are answered with, and which row each takes.
 struct Answers {
-    Gathered gathered;
-    std::vector<Rgb> thin;  // thickness_gains; empty where the body has none
+    Gathered gathered, at_surface;  // the latter where the body has a surface_tree
+    std::vector<Rgb> thin;          // thickness_gains; empty where the body has none
     std::vector<std::uint32_t> row_of;
 };
 
@@ -34,9 +34,12 @@ std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
     return positions;
 }
 
-// Each place that requests without a row ask for once.
-std::vector<V3f> shared_places(std::span<const GatherRequest> requests, float cell,
-                               std::vector<std::uint32_t>& row_of) {
+// Each place that requests without a row ask for once, as deep as these tell and on the surface.
+struct Places {
+    std::vector<V3f> below, surface;
+};
+
+Places shared_places(std::span<const GatherRequest> requests, float cell, std::vector<std::uint32_t>& row_of) {
     struct Key {
         std::uint64_t hash;
         std::uint32_t request;
@@ -50,14 +53,17 @@ std::vector<V3f> shared_places(std::span<const GatherRequest> requests, float ce
     }
     std::sort(keys.begin(), keys.end(),
               [](const Key& a, const Key& b) { return a.hash != b.hash ? a.hash < b.hash : a.request < b.request; });
-    std::vector<V3f> places;
+    Places places;
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
-        V3d sum(0.0);
+        V3d sum(0.0), inwards(0.0);
         for (end = begin; end < keys.size() && keys[end].hash == keys[begin].hash; ++end) {
-            sum += V3d(requests[keys[end].request].position);
-            row_of[keys[end].request] = static_cast<std::uint32_t>(places.size());
+            const GatherRequest& request = requests[keys[end].request];
+            sum += V3d(request.position);
+            inwards -= V3d(request.normal) * double(request.depth);
+            row_of[keys[end].request] = static_cast<std::uint32_t>(places.below.size());
         }
-        places.emplace_back(sum / double(end - begin));
+        places.below.emplace_back((sum + inwards) / double(end - begin));
+        places.surface.emplace_back(sum / double(end - begin));
     }
     return places;
 }
@@ -106,9 +112,14 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
         is_blended.push_back(i);
         if (request.is_primary) last_seen = i;
     }
-    places = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
+    Places shared = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
+    places = std::move(shared.below);
     const std::vector<V3f> at_tree = moved(places, body.to_points);
     answers.gathered = body.tree->gather(at_tree.data(), at_tree.size(), options);
+    if (body.surface_tree) {
+        const std::vector<V3f> there = moved(std::move(shared.surface), body.to_points);
+        answers.at_surface = body.surface_tree->gather(there.data(), there.size(), options);
+    }
     answers.thin = thickness_gains(body.thickness.get(), at_tree.data(), at_tree.size(), options);
     append(answers.gathered.exitance, blended.exitance);
     append(answers.gathered.coverage, blended.coverage);
@@ -118,7 +129,68 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     return answers;
 }
 
+// Light of the core at a row of answers, as a compensation has it: sums that it divides by their coverage stand inwards, others
+// on the surface.
+class Exitance {
+  public:
+    Exitance(const Body& body, const Answers& answers, std::size_t row)
+        : body_(body), answers_(answers), row_(row), thin_(answers.thin.empty() ? nullptr : &answers.thin[row]) {}
+
+    // W on the surface, if it is known there.
+    const Rgb& coverage() const {
+        return (answers_.at_surface.coverage.empty() ? answers_.gathered : answers_.at_surface).coverage[row_];
+    }
+    Rgb operator()(const Compensation& compensation, std::size_t group) const {
+        return of(compensation, [&](const Gathered& sums) { return exitance(sums, group); });
+    }
+    // The part of a ramp's knot.
+    Rgb knot(const Compensation& compensation, std::size_t knot, std::size_t group) const {
+        return of(compensation, [&](const Gathered& sums) {
+            return sums.knots > 0 ? sums.layers[(row_ * sums.knots + knot) * sums.groups + group]
+                                  : exitance(sums, group);
+        });
+    }
+    // What the sums below the surface are scaled by, all groups together.
+    Rgb gain_below(const Compensation& compensation) const {
+        if (answers_.at_surface.coverage.empty()) return gain(compensation, answers_.gathered);
+        Rgb whole(0.0f), sums(0.0f), scale(0.0f);
+        for (std::size_t group = 0; group < answers_.gathered.groups; ++group) {
+            whole += (*this)(compensation, group);
+            sums += exitance(answers_.gathered, group);
+        }
+        for (int c = 0; c < 3; ++c) scale[c] = sums[c] != 0.0f ? whole[c] / sums[c] : 0.0f;
+        return scale;
+    }
+
+  private:
+    template <class Value>
+    Rgb of(const Compensation& compensation, const Value& value) const {
+        const Rgb below = value(answers_.gathered);
+        if (answers_.at_surface.coverage.empty()) return below * gain(compensation, answers_.gathered);
+        const Rgb surface = value(answers_.at_surface);
+        if (!keeps_energy(compensation.mode)) return surface * gain(compensation, answers_.at_surface);
+        Compensation full = compensation;
+        full.strength = 1.0f;
+        return surface + (below * gain(full, answers_.gathered) - surface) * compensation.strength;
+    }
+    Rgb exitance(const Gathered& sums, std::size_t group) const { return sums.exitance[row_ * sums.groups + group]; }
+    Rgb gain(const Compensation& compensation, const Gathered& sums) const {
+        return body_.gain(compensation, sums.coverage[row_],
+                          compensation.mode == CompensationMode::depth ? thin_ : nullptr);
+    }
+
+    const Body& body_;
+    const Answers& answers_;
+    std::size_t row_;
+    const Rgb* thin_;
+};
+
 }  // namespace
+
+struct Gathering::Answer {
+    const Answers& answers;
+    Exitance exitance;
+};
 
 void Gathering::answer(const GatherOptions& options, Tile& tile) const {
     // One gather per body: requests grouped by object, in their own order.
@@ -131,8 +203,9 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
         std::vector<V3f> places;
-        const auto [gathered, thin, row_of] =
+        const Answers answers =
             answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers, places);
+        const Gathered& gathered = answers.gathered;
         tile.gathers += places.size();
         Gathered by_overlay;
         if (body.overlay_tree) {
@@ -142,16 +215,15 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
-            const std::size_t row = row_of[i - begin];
+            const std::size_t row = answers.row_of[i - begin];
+            const Answer answer{answers, Exitance(body, answers, row)};
             tile.subset = request.subset;
-            const Rgb& coverage = gathered.coverage[row];
+            const Rgb& coverage = answer.exitance.coverage();
             const Compensation& compensation = body.material->compensation;
-            const Rgb* thin_gain = thin.empty() ? nullptr : &thin[row];
-            const Rgb gain =
-                body.gain(compensation, coverage, compensation.mode == CompensationMode::depth ? thin_gain : nullptr);
+            const Rgb gain = answer.exitance.gain_below(compensation);
             const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
             for (std::size_t group = 0; group < gathered.groups; ++group) {
-                Rgb exitance = gathered.exitance[row * gathered.groups + group] * gain;
+                Rgb exitance = answer.exitance(compensation, group);
                 if (group == request.entering_group) exitance += fill;
                 tile.add(request.pixel, Component::translucency, group, exitance * request.translucency);
                 tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
@@ -174,11 +246,11 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
             }
             if (layout_.ice_plane_count() == 0) continue;
             const Rgb elsewhere = request.diffuse + request.specular + request.refraction;
-            if (request.is_primary) add_planes(request, request.translucency, 0, gathered, row, thin_gain, tile);
+            if (request.is_primary) add_planes(request, request.translucency, 0, answer, tile);
             if (elsewhere != Rgb(0.0f)) {
-                add_planes(request, elsewhere, layout_.seen_plane_count(), gathered, row, thin_gain, tile);
+                add_planes(request, elsewhere, layout_.seen_plane_count(), answer, tile);
                 for (std::size_t group = 0; group < gathered.groups; ++group) {
-                    const Rgb exitance = gathered.exitance[row * gathered.groups + group] * gain;
+                    const Rgb exitance = answer.exitance(compensation, group);
                     tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, group, exitance * elsewhere);
                 }
                 tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, request.entering_group,
@@ -228,25 +300,20 @@ void Gathering::add_taken(const GatherRequest& request, const Rgb* taken, std::s
 
 // Light of the core once more, apart by ramp knot and as every compensation mode that was asked for would have it: `weight`
 // is radiance per exitance, `base` the first plane.
-void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
-                           std::size_t row, const Rgb* thin_gain, Tile& tile) const {
+void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Answer& answer,
+                           Tile& tile) const {
+    const Gathered& gathered = answer.answers.gathered;
     const Body& body = *bodies_[request.object];
     const Compensation& rendered = body.material->compensation;
-    const Rgb& coverage = gathered.coverage[row];
+    const Rgb& coverage = answer.exitance.coverage();
     const auto fill_of = [&](const Compensation& compensation) {
         return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
     };
-    const auto thin_of = [&](const Compensation& compensation) {
-        return compensation.mode == CompensationMode::depth ? thin_gain : nullptr;
-    };
     if (!layout_.knots.empty()) {
-        const Rgb scale = body.gain(rendered, coverage, thin_of(rendered)) * weight;
         const std::size_t first = base + layout_.first_knot[scene_.objects[request.object].material];
         for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
-            const Rgb* light = gathered.knots > 0 ? &gathered.layers[(row * gathered.knots + k) * gathered.groups]
-                                                  : &gathered.exitance[row * gathered.groups];
             for (std::size_t g = 0; g < gathered.groups; ++g) {
-                tile.add_to_plane(request.pixel, first + k, g, light[g] * scale);
+                tile.add_to_plane(request.pixel, first + k, g, answer.exitance.knot(rendered, k, g) * weight);
             }
         }
         if (layout_.fill_plane != FilmLayout::kNone) {
@@ -258,9 +325,8 @@ void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std:
         full.mode = layout_.modes[m];
         full.strength = 1.0f;
         const std::size_t plane = base + layout_.knots.size() + m;
-        const Rgb scale = body.gain(full, coverage, thin_of(full)) * weight;
         for (std::size_t g = 0; g < gathered.groups; ++g) {
-            tile.add_to_plane(request.pixel, plane, g, gathered.exitance[row * gathered.groups + g] * scale);
+            tile.add_to_plane(request.pixel, plane, g, answer.exitance(full, g) * weight);
         }
         tile.add_to_plane(request.pixel, plane, request.entering_group, fill_of(full));
     }

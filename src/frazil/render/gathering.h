@@ -26,8 +26,9 @@ class Gathering {
     void answer(const GatherOptions& options, Tile& tile) const;
 
   private:
-    void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Gathered& gathered,
-                    std::size_t row, const Rgb* thin_gain, Tile& tile) const;
+    struct Answer;
+    void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Answer& answer,
+                    Tile& tile) const;
 
     void add_overlays(const GatherRequest& request, const Rgb* exitance, std::size_t groups, const Rgb& gain,
                       const Rgb& fill, Tile& tile) const;

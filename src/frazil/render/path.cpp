@@ -192,8 +192,9 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             core.is_primary = path.bounce == 0;
             add_entering_light(core, path, surface, *body);
             if (!is_open || crossing.to == InsideOf::kNone) {
-                core.drift *=
-                    core.is_primary ? body->drift_within(chord_behind(surface, path.ray.direction, tile)) : 0.0f;
+                const float chord = core.is_primary ? chord_behind(surface, path.ray.direction, tile) : 0.0f;
+                core.drift *= body->drift_within(chord);
+                if (core.is_primary) core.depth *= body->drift_within(0.5f * chord);
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {
                 *split = path;

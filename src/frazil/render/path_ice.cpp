@@ -36,9 +36,10 @@ IceCore PathTracer::core_at(const Path& path, const Surface& surface, int body, 
     core.body = body;
     core.position = surface.position;
     core.normal = from_inside ? -surface.geometric_normal : surface.geometric_normal;
+    core.depth = ice.depth();
     core.radiance_per_exitance = ice.inner_radiance_per_exitance(surface);
     if (!from_inside) {
-        core.radiance_per_exitance *= ice.angular_share(std::abs(surface.normal.dot(path.ray.direction)));
+        core.radiance_per_exitance *= ice.leaving_share(std::abs(surface.normal.dot(path.ray.direction)));
         core.drift = ice.drift(path.ray.direction, surface.normal);
     }
     return core;
@@ -100,6 +101,7 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
         }
     }
     path.core.drift *= bodies_[std::size_t(body)]->drift_within(length);
+    path.core.depth *= bodies_[std::size_t(body)]->drift_within(0.5f * length);
     request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
 
     path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
@@ -190,6 +192,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.subset = tile.subset;
     request.position = core.position + core.drift;
     request.normal = core.normal;
+    request.depth = core.depth;
     request.is_primary = core.is_primary;
     request.samples = path.samples;
     request.entering = core.entering;

@@ -59,8 +59,9 @@ struct IceCore {
     int body = InsideOf::kNone;
     V3f position = V3f(0.0f);
     V3f normal = V3f(0.0f);  // outwards; 0 where the position lies inside, not on the surface
-    // From there to below where the light that is seen was scattered last, on the mean, in a body without another side.
+    // From there along the surface to where the light that is seen was scattered last, on the mean, in a body without another side.
     V3f drift = V3f(0.0f);
+    float depth = 0.0f;                     // how far inwards that is
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
     bool is_primary = false;                // seen by the camera itself
     bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there

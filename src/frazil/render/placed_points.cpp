@@ -13,7 +13,7 @@ void PointCloud::add_cells(bool needs_places, const std::function<Cells(const Po
     const std::lock_guard lock(mutex_);
     if (cells_ && !(needs_places && cells_->places.empty())) return;
     cells_ = std::make_shared<const Cells>(make(points_));
-    clusters_ = nullptr;
+    clusters_ = surface_clusters_ = nullptr;
 }
 
 void PointCloud::drop_places() {
@@ -28,8 +28,52 @@ void PointCloud::drop_places() {
 
 std::shared_ptr<const PointClusters> PointCloud::clusters() {
     const std::lock_guard lock(mutex_);
-    if (!clusters_) clusters_ = std::make_shared<const PointClusters>(cluster_points(points_, cells_.get()));
+    if (clusters_) return clusters_;
+    PointSet points = points_;
+    Cells cells;
+    if (cells_) {
+        cells.areas = cells_->areas;
+        cells.centroids = cells_->centroids;
+        cells.covariances = cells_->covariances;
+    }
+    for (std::size_t k = 0; k < room_.inwards.size(); ++k) {
+        const V3f inwards = points_.normals[k] * (-depth_ * room_.inwards[k]);
+        points.positions[k] += inwards;
+        if (cells_) cells.centroids[k] += inwards;
+    }
+    clusters_ = std::make_shared<const PointClusters>(cluster_points(points, cells_ ? &cells : nullptr));
     return clusters_;
+}
+
+std::shared_ptr<const PointClusters> PointCloud::surface_clusters() {
+    const std::lock_guard lock(mutex_);
+    if (!surface_clusters_) {
+        surface_clusters_ = std::make_shared<const PointClusters>(cluster_points(points_, cells_.get()));
+    }
+    return surface_clusters_;
+}
+
+void PointCloud::add_room(float sigma_t, float depth, const std::function<Room()>& make) {
+    const std::lock_guard lock(mutex_);
+    if (!room_.inwards.empty() && sigma_t_ == sigma_t && depth_ == depth) return;
+    room_ = make();
+    sigma_t_ = sigma_t;
+    depth_ = depth;
+    clusters_ = nullptr;
+}
+
+std::vector<V3f> PointCloud::inward_positions() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<V3f> positions = points_.positions;
+    for (std::size_t k = 0; k < room_.inwards.size(); ++k) {
+        positions[k] -= points_.normals[k] * (depth_ * room_.inwards[k]);
+    }
+    return positions;
+}
+
+std::vector<float> PointCloud::room_along() const {
+    const std::lock_guard lock(mutex_);
+    return room_.along;
 }
 
 std::shared_ptr<const PointLookup> PointCloud::lookup() {

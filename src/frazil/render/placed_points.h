@@ -12,6 +12,7 @@
 #include "frazil/points/cells.h"
 #include "frazil/points/point_lookup.h"
 #include "frazil/points/point_set.h"
+#include "frazil/render/drift.h"
 #include "frazil/translucency/point_clusters.h"
 
 namespace frazil {
@@ -28,15 +29,26 @@ class PointCloud {
     // Places are of use to bakes alone.
     void drop_places();
 
-    // Made when first asked for, with the cells that are there by then.
+    // Give it the room that its body leaves for a first scattering, `depth` metres inwards where there is room; unless it has
+    // it already.
+    void add_room(float sigma_t, float depth, const std::function<Room()>& make);
+    // Where light is scattered first, on the mean: what its clusters are made of, and exitance is summed at.
+    std::vector<V3f> inward_positions() const;
+    std::vector<float> room_along() const;
+
+    // Made when first asked for, with the cells and the room that are there by then.
     std::shared_ptr<const PointClusters> clusters();
+    // The same without that room: on the surface.
+    std::shared_ptr<const PointClusters> surface_clusters();
     std::shared_ptr<const PointLookup> lookup();
 
   private:
     PointSet points_;
     mutable std::mutex mutex_;  // over what follows
     std::shared_ptr<const Cells> cells_;
-    std::shared_ptr<const PointClusters> clusters_;
+    Room room_;
+    float sigma_t_ = 0.0f, depth_ = 0.0f;  // of the room
+    std::shared_ptr<const PointClusters> clusters_, surface_clusters_;
     std::shared_ptr<const PointLookup> lookup_;
 };
 

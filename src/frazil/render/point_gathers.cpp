@@ -34,9 +34,12 @@ GatherOptions PointGatherPlan::options_for(const Body& body) const {
     return options;
 }
 
-std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointSet& points, std::size_t groups,
+std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                        PointGatherPlan& plan) {
-    if (plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points)) return nullptr;
+    const PointSet& points = cloud.points();
+    if (body.surface_tree || plan.paths < double(points.size()) || !(points.spacing > 0.0) || !is_even(points)) {
+        return nullptr;
+    }
     const GatherOptions options = plan.options_for(body);
     const std::size_t knots = options.ramp_layers ? body.material->ramp.distances.size() : 0;
     const std::size_t bytes = points.size() * bytes_per_point(groups, knots, body.thickness != nullptr);
@@ -44,8 +47,9 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     plan.bytes -= bytes;
     plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(points, kReach * static_cast<float>(points.spacing)));
+    const std::vector<V3f> inwards = cloud.inward_positions();
     std::vector<V3f> places;
-    for (const std::uint32_t i : result->lookup_.order()) places.push_back(points.positions[i]);
+    for (const std::uint32_t i : result->lookup_.order()) places.push_back(inwards[i]);
     result->at_points_ = body.tree->gather(places.data(), places.size(), options);
     result->thin_ = thickness_gains(body.thickness.get(), places.data(), places.size(), options);
     return result;

@@ -17,6 +17,7 @@
 namespace frazil {
 
 struct Body;
+class PointCloud;
 
 // Whether gathers at all points are worth their time and memory.
 struct PointGatherPlan {
@@ -32,7 +33,7 @@ class PointGathers {
   public:
     // Null where the plan has no use for it, or the points' spacing varies. Takes its points and memory off the plan's. The
     // body has its trees already, of so many light groups.
-    static std::shared_ptr<const PointGathers> make(const Body& body, const PointSet& points, std::size_t groups,
+    static std::shared_ptr<const PointGathers> make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                     PointGatherPlan& plan);
 
     // Append to `gathered` and `thin` (thickness_gains; left empty where the body has none) the row of a place on the

@@ -277,7 +277,7 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const auto plant = [&](const std::vector<LitPoints>& lit, const std::function<void(std::size_t)>& has_taken) {
         const double paths = double(options.width) * options.height * options.samples;
         const TranslucencySets sets =
-            plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
+            plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), layout.needs_surface(),
                         {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
         if (has_overlays) plant_overlay_trees(scene, lit, sets, layout.overlay_of, groups.size(), bodies);
         if (layout.has("occlusion") || layout.has("bent_normal")) {

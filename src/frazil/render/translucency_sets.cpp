@@ -55,6 +55,9 @@ TranslucencySets::TranslucencySets(const Scene& scene, const RayScene& ray_scene
     }
     std::erase_if(unions_, [](const Union& set) { return set.members.size() < 2; });
     for (Union& set : unions_) unite(set);
+    for (std::size_t i = 0; i < leader_.size(); ++i) {
+        if (bodies[i] && is_leader(i) && points(i).size() > 0) add_room(i, *bodies[i], ray_scene, shells(i), points(i));
+    }
 }
 
 void TranslucencySets::unite(Union& set) const {

@@ -20,6 +20,10 @@ Rgb covered_fraction(const Rgb& coverage, const Rgb& albedo, bool by_luminance) 
 
 }  // namespace
 
+bool keeps_energy(CompensationMode mode) {
+    return mode == CompensationMode::conserve || mode == CompensationMode::depth;
+}
+
 const char* compensation_name(CompensationMode mode) {
     switch (mode) {
         case CompensationMode::off:

@@ -22,6 +22,9 @@ enum class CompensationMode {
 // As users write it: "off", "ratio" ...
 const char* compensation_name(CompensationMode mode);
 
+// Whether M is divided by the coverage whatever that is, so that it does not matter where the sums stand.
+bool keeps_energy(CompensationMode mode);
+
 struct Compensation {
     CompensationMode mode = CompensationMode::depth;
     float limit = 100.0f;       // largest gain, >= 1

@@ -123,17 +123,20 @@ HalfSpaceAlbedo half_space_albedo(double alpha, double eta) {
     return {single, sky.flux(all) / sky.entered_flux - single};
 }
 
-DirectionalAlbedo::DirectionalAlbedo(double alpha, double eta) {
+DirectionalAlbedo::DirectionalAlbedo(double alpha, double eta, double less_once) {
     values_.fill(1.0f);
     if (alpha == 0.0) return;
     const SkyLight sky = sky_light(alpha, eta);
     const std::vector<double> ones(sky.h.size(), 1.0);
-    const double mean = half_space_albedo(alpha, eta).all();
+    const HalfSpaceAlbedo exact = half_space_albedo(alpha, eta);
+    const double mean = exact.multiple + (1.0 - less_once) * exact.single;
     for (int i = 0; i <= kSteps; ++i) {
         const double root = double(i) / kSteps, mu = root * root;
         // H(mu) from H at the nodes.
         const double h = 1.0 / (std::sqrt(1.0 - alpha) + scattered(alpha, mu, 1.0, sky.nodes, sky.h, ones));
-        values_[std::size_t(i)] = static_cast<float>(scattered(alpha, mu, h, sky.nodes, sky.h, sky.inward) / mean);
+        const double all = scattered(alpha, mu, h, sky.nodes, sky.h, sky.inward);
+        const double once = less_once * scattered(alpha, mu, 1.0, sky.nodes, ones, sky.entered);
+        values_[std::size_t(i)] = static_cast<float>((all - once) / mean);
     }
 }
 

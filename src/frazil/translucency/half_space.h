@@ -21,10 +21,11 @@ HalfSpaceAlbedo half_space_albedo(double alpha, double eta);
 
 // How much of the light that enters at an angle leaves again, over the mean of light from all around; by reciprocity also
 // how the radiance that leaves under light from all around depends on the angle. 1 where nothing is absorbed. Tabulated, 1e-3.
+// The part `less_once` of the light that is scattered once does not count: what is left has its own angles, white or not.
 class DirectionalAlbedo {
   public:
     DirectionalAlbedo() { values_.fill(1.0f); }
-    DirectionalAlbedo(double alpha, double eta);
+    DirectionalAlbedo(double alpha, double eta, double less_once = 0.0);
     // mu: the cosine inside, 0..1.
     float operator()(float mu) const;
 

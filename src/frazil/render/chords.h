@@ -1,0 +1,43 @@
+// Chords of a body: ways from a point of its surface inwards to where the body ends.
+// Model: cosine-distributed, quasi-random; of a body by itself, or of several that are one (shells.h).
+// Units: metres.
+// Valid: thread-safe; the same chords for the same point and seed.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "frazil/base/sampler.h"
+#include "frazil/geometry/ray_scene.h"
+#include "frazil/points/point_set.h"
+#include "frazil/render/shells.h"
+
+namespace frazil {
+
+struct Chord {
+    Ray ray;              // inwards
+    float cosine = 1.0f;  // to the normal
+    float length = 0.0f;  // infinite where there is no other side
+};
+
+class ChordFinder {
+  public:
+    // `shells` that are one body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
+    // Both, and the scene, must outlive this; they may be null.
+    ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask);
+
+    // Chords from a point; false where one of a body by itself finds no other side.
+    bool find(const PointSet& points, std::size_t point, std::uint32_t seed, std::vector<Chord>& chords) const;
+    // How far it is along a ray from inside to where the body ends; infinite where it does not.
+    float way_out(const Ray& ray) const;
+    // Quasi-random numbers, one per chord.
+    void draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& u) const;
+
+  private:
+    const RayScene& scene_;
+    const Shells* shells_;
+    PlacementMask mask_;
+    ScrambledNet net_;
+};
+
+}  // namespace frazil
