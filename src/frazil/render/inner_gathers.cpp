@@ -9,7 +9,7 @@
 namespace frazil {
 namespace {
 
-constexpr double kCell = 0.5;                             // in mean free paths
+constexpr double kCell = 0.4;                             // in mean free paths
 constexpr std::int64_t kCells = 4, kNodes = kCells + 1;   // of a brick, along an axis
 constexpr std::size_t kMostBytes = std::size_t(1) << 28;  // that a body's bricks take
 

@@ -1,6 +1,6 @@
 // What ice would send from places inside it, gathered on a lattice, for cracks and whatever else paths meet there.
 // Model: exitance varies over mean free paths, inside as on the surface, and places inside are met one here, one there, so
-//   that a gather at each is dear: a lattice of half a mean free path, gathered brick by brick where paths come by, and
+//   that a gather at each is dear: a lattice of 0.4 mean free paths, gathered brick by brick where paths come by, and
 //   interpolated linearly.
 // Units: as Gathered; metres, where the body's trees stand.
 // Valid: thread-safe; a brick's values are the same whoever asks for it first. Within 1 % RMS of a gather
