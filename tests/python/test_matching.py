@@ -27,13 +27,13 @@ def factors(recipe):
     return {group: mix.factor for group, mix in read_recipe(recipe).lights.items()}
 
 
-def assert_factors(found, expected, faint=0.02):
-    """Within 2 %; the faint negative light may be off by `faint`."""
+def assert_factors(found, expected, tolerance=0.02, faint=0.02):
+    """Within `tolerance`; the faint negative light may be off by `faint`."""
     for group, factor in factors({"lights": expected}).items():
         np.testing.assert_allclose(
             factors(found)[group],
             factor,
-            atol=(faint if group == "fill" else 0.02) * max(1.0, np.abs(factor).max()),
+            atol=(faint if group == "fill" else tolerance) * max(1.0, np.abs(factor).max()),
             err_msg=group,
         )
 
@@ -52,7 +52,7 @@ def test_a_painting_of_eight_bits_is_enough(film, tmp_path):
     found = fz.match(film, tmp_path / "art.png")
     halved = {group: mix | {"intensity": 0.5 * mix["intensity"]} for group, mix in LIGHTS.items()}
     # Eight bits do not show more of it: by seeds 0 to 4, at 8 and 32 samples, it comes back as 0 to 0.09 of a light.
-    assert_factors(found.recipe, halved, faint=0.1)
+    assert_factors(found.recipe, halved, tolerance=0.03, faint=0.1)
 
 
 def test_ramp_colours_are_found_again(film):
