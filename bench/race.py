@@ -82,7 +82,7 @@ flip = np.diag([-1.0, 1.0, -1.0, 1.0])  # Mitsuba's cameras and rectangles look 
 total = job['sigma_s'] + job['sigma_a']
 half = np.diag([job['width'] / 2, job['width'] / 2, 1.0, 1.0])
 scene = mi.load_dict({'type': 'scene',
-    'integrator': {'type': 'volpath', 'max_depth': -1, 'rr_depth': 64},
+    'integrator': {'type': 'volpath', 'max_depth': -1, 'rr_depth': 1 << 20},
     'sensor': {'type': 'perspective', 'fov': float(np.degrees(job['fov'])), 'to_world': transform(flip @ matrix),
         'film': {'type': 'hdrfilm', 'width': job['size'], 'height': job['size'], 'rfilter': {'type': 'box'},
                  'pixel_format': 'rgb', 'component_format': 'float32'},
