@@ -71,7 +71,6 @@ PointLookup::At PointLookup::locate(const V3f& position) const {
 std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {
     const At at = locate(position);
     std::uint32_t on_side = kNone, any = kNone;
-    for (const auto& neighbour : kNeighbours) __builtin_prefetch(&first_[bucket(at, neighbour)]);
     // Nothing farther than two cells: distant ones may share a bucket.
     float nearest_on_side = 4.0f * size2_, nearest_any = nearest_on_side;
     for (const auto& neighbour : kNeighbours) {
