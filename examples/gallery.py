@@ -1,6 +1,6 @@
 """Renders the eight formations: EXR and PNG into out/gallery, small PNGs into a folder of the documentation.
 
-    python examples/gallery.py [NAME ...] [-o out/gallery] [--docs docs/images/gallery] [--samples 12]
+python examples/gallery.py [NAME ...] [-o out/gallery] [--docs docs/images/gallery] [--samples 12]
 """
 
 import argparse
