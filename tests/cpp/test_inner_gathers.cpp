@@ -5,6 +5,7 @@
 #include "frazil/render/bodies.h"
 #include "frazil/render/inner_gathers.h"
 #include "frazil/render/translucency_sets.h"
+#include "relative_rms.h"
 #include "scenes.h"
 #include "shapes.h"
 
@@ -57,16 +58,6 @@ Rows interpolated(const InnerGathers& inside, const std::vector<V3f>& places) {
     return rows;
 }
 
-double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
-    REQUIRE(a.size() == b.size());
-    double difference = 0.0, whole = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        difference += double((a[i] - b[i]).length2());
-        whole += double(b[i].length2());
-    }
-    return std::sqrt(difference / whole);
-}
-
 }  // namespace
 
 TEST_CASE("inner gathers: between the nodes as right there, within a percent") {
@@ -77,10 +68,10 @@ TEST_CASE("inner gathers: between the nodes as right there, within a percent") {
     const Gathered there = ball.bodies[0]->tree->gather(places.data(), places.size(), ball.options);
     const std::vector<Rgb> thin_there =
         thickness_gains(ball.bodies[0]->thickness.get(), places.data(), places.size(), ball.options);
-    CHECK(relative_rms(rows.sums.exitance, there.exitance) < 0.01);
-    CHECK(relative_rms(rows.sums.coverage, there.coverage) < 0.01);
-    CHECK(relative_rms(rows.sums.layers, there.layers) < 0.02);
-    CHECK(relative_rms(rows.thin, thin_there) < 0.001);
+    CHECK(test::relative_rms(rows.sums.exitance, there.exitance) < 0.01);
+    CHECK(test::relative_rms(rows.sums.coverage, there.coverage) < 0.01);
+    CHECK(test::relative_rms(rows.sums.layers, there.layers) < 0.02);
+    CHECK(test::relative_rms(rows.thin, thin_there) < 0.001);
     Rgb sum(0.0f), sum_there(0.0f);
     for (const Rgb& e : rows.sums.exitance) sum += e;
     for (const Rgb& e : there.exitance) sum_there += e;

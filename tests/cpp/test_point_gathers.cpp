@@ -4,6 +4,7 @@
 #include "frazil/render/bodies.h"
 #include "frazil/render/point_gathers.h"
 #include "frazil/render/translucency_sets.h"
+#include "relative_rms.h"
 #include "scenes.h"
 #include "shapes.h"
 
@@ -40,15 +41,6 @@ PointGatherPlan plenty() {
     return plan;
 }
 
-double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b) {
-    double difference = 0.0, whole = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        difference += double((a[i] - b[i]).length2());
-        whole += double(b[i].length2());
-    }
-    return std::sqrt(difference / whole);
-}
-
 }  // namespace
 
 TEST_CASE("point gathers: a blend comes within some thousandths of a gather at the place") {
@@ -72,10 +64,10 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
     const Gathered there = ball.bodies[0]->tree->gather(below.data(), below.size(), options);
     const std::vector<Rgb> thin_there =
         thickness_gains(ball.bodies[0]->thickness.get(), below.data(), below.size(), options);
-    CHECK(relative_rms(blended.exitance, there.exitance) < 0.006);
-    CHECK(relative_rms(blended.coverage, there.coverage) < 0.005);
-    CHECK(relative_rms(blended.layers, there.layers) < 0.012);
-    CHECK(relative_rms(thin, thin_there) < 0.006);
+    CHECK(test::relative_rms(blended.exitance, there.exitance) < 0.006);
+    CHECK(test::relative_rms(blended.coverage, there.coverage) < 0.005);
+    CHECK(test::relative_rms(blended.layers, there.layers) < 0.012);
+    CHECK(test::relative_rms(thin, thin_there) < 0.006);
 }
 
 TEST_CASE("point gathers: no rows off the surface or on its other side") {
