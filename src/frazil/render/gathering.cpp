@@ -13,13 +13,6 @@ namespace {
 // shorter: exitance is linear over it within one or two thousandths.
 constexpr float kCell = 0.5f;
 
-// Points nearer to each other than so many mean free paths serve the camera too: a blend of them is as near to a gather as
-// its tolerance.
-constexpr float kDense = 0.25f;
-
-// Of normals of places that share a blend.
-constexpr float kLeastCosine = 0.9f;
-
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 // What the requests of one body are answered with, and which row each takes.
@@ -68,11 +61,6 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
     return places;
 }
 
-bool is_close(const GatherRequest& a, const GatherRequest& b, float distance) {
-    return a.pixel == b.pixel && (a.position - b.position).length2() < distance * distance &&
-           a.normal.dot(b.normal) > kLeastCosine;
-}
-
 template <class Value>
 void append(std::vector<Value>& values, const std::vector<Value>& more) {
     values.insert(values.end(), more.begin(), more.end());
@@ -88,30 +76,19 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     Gathered blended;
     std::vector<Rgb> blended_thin;
     std::vector<std::uint32_t> is_blended;
-    std::uint32_t last_seen = kNoRow;  // of the requests that the camera itself makes
-    const Medium& medium = body.medium;
-    const float mean_free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
-    const bool serves_camera = body.spacing <= kDense * mean_free_path && !body.overlay_tree;
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
-        if (request.is_primary && !serves_camera) continue;
-        // What one pixel shows lies close together.
-        if (request.is_primary && last_seen < i && is_close(requests[last_seen], request, kCell * body.spacing)) {
-            answers.row_of[i] = answers.row_of[last_seen];
-            is_blended.push_back(i);
-            continue;
-        }
+        if (request.is_primary) continue;
         const V3f position = request.position * body.to_points;
         V3f normal;
         body.to_points.multDirMatrix(request.normal, normal);
         if (!body.at_points->append(position, normal, blended, blended_thin)) {
-            if (request.is_primary) continue;
             body.inside->append(position, blended, blended_thin);
         }
         answers.row_of[i] = static_cast<std::uint32_t>(blended.coverage.size() - 1);
         is_blended.push_back(i);
-        if (request.is_primary) last_seen = i;
     }
+    const float mean_free_path = 1.0f / max_component(body.medium.sigma_s_prime + body.medium.sigma_a);
     Places shared = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
     places = std::move(shared.below);
     const std::vector<V3f> at_tree = moved(places, body.to_points);
