@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "frazil/base/vec.h"
+#include "frazil/render/core_sums.h"
 
 namespace frazil::test {
 
@@ -19,6 +20,15 @@ inline double relative_rms(const std::vector<Rgb>& a, const std::vector<Rgb>& b)
         whole += double(b[i].length2());
     }
     return std::sqrt(difference / whole);
+}
+
+// Some columns of all rows.
+inline std::vector<Rgb> columns(const CoreSums& sums, std::size_t first, std::size_t count) {
+    std::vector<Rgb> values;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        values.insert(values.end(), sums.row(i) + first, sums.row(i) + first + count);
+    }
+    return values;
 }
 
 }  // namespace frazil::test

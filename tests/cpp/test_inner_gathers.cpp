@@ -32,7 +32,7 @@ struct LitBall {
         bodies = make_bodies(scene);
         RenderStats stats;
         const RayScene ray_scene(scene.meshes, {Placement{}});
-        plant_trees(scene, lit, 2, ray_scene, false, false, {}, bodies, stats);
+        plant_trees(scene, lit, 2, ray_scene, false, true, bodies, stats);
     }
 };
 
@@ -47,14 +47,9 @@ std::vector<V3f> places_inside() {
     return places;
 }
 
-struct Rows {
-    Gathered sums;
-    std::vector<Rgb> thin;
-};
-
-Rows interpolated(const InnerGathers& inside, const std::vector<V3f>& places) {
-    Rows rows;
-    for (const V3f& place : places) inside.append(place, rows.sums, rows.thin);
+CoreSums interpolated(const InnerGathers& inside, const std::vector<V3f>& places) {
+    CoreSums rows(inside.columns());
+    for (const V3f& place : places) inside.append(place, rows);
     return rows;
 }
 
@@ -64,29 +59,37 @@ TEST_CASE("inner gathers: between the nodes as right there, within a percent") {
     const LitBall ball(Ramp({0.0f, 0.1f, 0.3f}, {Rgb(1.0f), Rgb(0.5f), Rgb(2.0f)}));
     const InnerGathers inside(*ball.bodies[0], 2, ball.options);
     const std::vector<V3f> places = places_inside();
-    const Rows rows = interpolated(inside, places);
-    const Gathered there = ball.bodies[0]->tree->gather(places.data(), places.size(), ball.options);
-    const std::vector<Rgb> thin_there =
-        thickness_gains(ball.bodies[0]->thickness.get(), places.data(), places.size(), ball.options);
-    CHECK(test::relative_rms(rows.sums.exitance, there.exitance) < 0.01);
-    CHECK(test::relative_rms(rows.sums.coverage, there.coverage) < 0.01);
-    CHECK(test::relative_rms(rows.sums.layers, there.layers) < 0.02);
-    CHECK(test::relative_rms(rows.thin, thin_there) < 0.001);
-    Rgb sum(0.0f), sum_there(0.0f);
-    for (const Rgb& e : rows.sums.exitance) sum += e;
-    for (const Rgb& e : there.exitance) sum_there += e;
-    for (int c = 0; c < 3; ++c) CHECK(sum[c] == doctest::Approx(sum_there[c]).epsilon(0.003));
+    const CoreSums rows = interpolated(inside, places);
+    const CoreSums there = gather_core(ball.bodies[0]->trees, places, places, ball.options);
+    const SumColumns& columns = there.columns();
+    REQUIRE(rows.columns().count() == columns.count());
+    REQUIRE((columns.has_surface && columns.has_thin && columns.groups == 2 && columns.knots == 3));
+    const auto off_by = [&](std::size_t first, std::size_t count) {
+        return test::relative_rms(test::columns(rows, first, count), test::columns(there, first, count));
+    };
+    for (const std::size_t tree :
+         {std::size_t(0), columns.of_tree()}) {  // where light is scattered first, and on the surface
+        CHECK(off_by(tree, 1) < 0.01);
+        CHECK(off_by(tree + 1, 2) < 0.01);
+        CHECK(off_by(tree + 3, 6) < 0.02);
+        Rgb sum(0.0f), sum_there(0.0f);
+        for (const Rgb& e : test::columns(rows, tree + 1, 2)) sum += e;
+        for (const Rgb& e : test::columns(there, tree + 1, 2)) sum_there += e;
+        for (int c = 0; c < 3; ++c) CHECK(sum[c] == doctest::Approx(sum_there[c]).epsilon(0.003));
+    }
+    CHECK(off_by(columns.thin(), 1) < 0.001);
 }
 
 TEST_CASE("inner gathers: a place's row does not depend on what was asked before") {
     const LitBall ball;
     const std::vector<V3f> places = places_inside();
     const InnerGathers inside(*ball.bodies[0], 2, ball.options), again(*ball.bodies[0], 2, ball.options);
-    const Rows rows = interpolated(inside, places);
-    const Rows reversed = interpolated(again, {places.rbegin(), places.rend()});
+    const CoreSums rows = interpolated(inside, places);
+    const CoreSums reversed = interpolated(again, {places.rbegin(), places.rend()});
     for (std::size_t i = 0; i < places.size(); ++i) {
-        CHECK(rows.sums.coverage[i] == reversed.sums.coverage[places.size() - 1 - i]);
-        CHECK(rows.thin[i] == reversed.thin[places.size() - 1 - i]);
+        for (std::size_t k = 0; k < rows.columns().count(); ++k) {
+            CHECK(rows.row(i)[k] == reversed.row(places.size() - 1 - i)[k]);
+        }
     }
 }
 

@@ -29,7 +29,7 @@ struct LitBall {
         bodies = make_bodies(scene);
         RenderStats stats;
         const RayScene ray_scene(scene.meshes, {Placement{}});
-        plant_trees(scene, lit, 1, ray_scene, false, false, {}, bodies, stats);
+        plant_trees(scene, lit, 1, ray_scene, false, true, bodies, stats);
     }
 };
 
@@ -51,23 +51,28 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
     CHECK(plan.bytes < plenty().bytes);
     CHECK(plan.paths == plenty().paths - double(ball.points.size()));
     const PointSet places = poisson_points(ball.scene.meshes[0], 0.1, {7});
-    Gathered blended;
-    std::vector<Rgb> thin;
+    CoreSums blended(at_points->columns());
     for (std::size_t i = 0; i < places.size(); ++i) {
-        REQUIRE(at_points->append(places.positions[i], places.normals[i], blended, thin));
+        REQUIRE(at_points->append(places.positions[i], places.normals[i], false, blended));
     }
     GatherOptions options;
     options.ramp_layers = true;
     // Rows are of as far below as light is scattered first.
     std::vector<V3f> below = places.positions;
     for (std::size_t i = 0; i < below.size(); ++i) below[i] -= places.normals[i] * ball.bodies[0]->depth();
-    const Gathered there = ball.bodies[0]->tree->gather(below.data(), below.size(), options);
-    const std::vector<Rgb> thin_there =
-        thickness_gains(ball.bodies[0]->thickness.get(), below.data(), below.size(), options);
-    CHECK(test::relative_rms(blended.exitance, there.exitance) < 0.006);
-    CHECK(test::relative_rms(blended.coverage, there.coverage) < 0.005);
-    CHECK(test::relative_rms(blended.layers, there.layers) < 0.012);
-    CHECK(test::relative_rms(thin, thin_there) < 0.006);
+    const CoreSums there = gather_core(ball.bodies[0]->trees, below, places.positions, options);
+    const SumColumns& columns = there.columns();
+    REQUIRE(blended.columns().count() == columns.count());
+    REQUIRE((columns.has_surface && columns.has_thin && columns.knots == 3));
+    const auto off_by = [&](std::size_t first, std::size_t count) {
+        return test::relative_rms(test::columns(blended, first, count), test::columns(there, first, count));
+    };
+    for (const std::size_t tree : {std::size_t(0), columns.of_tree()}) {  // below, and on the surface
+        CHECK(off_by(tree, 1) < 0.005);
+        CHECK(off_by(tree + 1, 1) < 0.006);
+        CHECK(off_by(tree + 2, 3) < 0.012);
+    }
+    CHECK(off_by(columns.thin(), 1) < 0.006);
 }
 
 TEST_CASE("point gathers: no rows off the surface or on its other side") {
@@ -75,13 +80,12 @@ TEST_CASE("point gathers: no rows off the surface or on its other side") {
     PointGatherPlan plan = plenty();
     const auto at_points = PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, plan);
     REQUIRE(at_points);
-    Gathered rows;
-    std::vector<Rgb> thin;
-    CHECK_FALSE(at_points->append(V3f(0.5f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows, thin));
-    CHECK_FALSE(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(-1.0f, 0.0f, 0.0f), rows, thin));
-    CHECK(rows.coverage.empty());
-    CHECK(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows, thin));
-    CHECK(rows.coverage.size() == 1);
+    CoreSums rows(at_points->columns());
+    CHECK_FALSE(at_points->append(V3f(0.5f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), false, rows));
+    CHECK_FALSE(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(-1.0f, 0.0f, 0.0f), false, rows));
+    CHECK(rows.size() == 0);
+    CHECK(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), false, rows));
+    CHECK(rows.size() == 1);
 }
 
 TEST_CASE("point gathers: what the camera sees itself is gathered there, however near the points are to each other") {

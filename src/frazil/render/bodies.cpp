@@ -15,9 +15,6 @@
 namespace frazil {
 namespace {
 
-// Thickness varies slowly: its gathers may be this much coarser.
-constexpr float kThicknessTolerance = 4.0f;
-
 double single_albedo(const Medium& medium, int channel) {
     return medium.sigma_s_prime[channel] / (double(medium.sigma_s_prime[channel]) + medium.sigma_a[channel]);
 }
@@ -61,6 +58,10 @@ V3f Body::drift(const V3f& direction, const V3f& normal) const {
 float Body::sigma_t() const {
     const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
     return (extinction.x + extinction.y + extinction.z) / 3.0f;
+}
+
+float Body::mean_free_path() const {
+    return 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
 }
 
 float Body::drift_within(float length) const {
@@ -217,20 +218,6 @@ std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::siz
     return shared;
 }
 
-std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
-                                 const GatherOptions& options) {
-    if (!thickness) return {};
-    const Gathered sums =
-        thickness->gather(positions, count, {kThicknessTolerance * options.tolerance, Estimator::sum, false});
-    std::vector<Rgb> gains(count, Rgb(1.0f));
-    for (std::size_t i = 0; i < count; ++i) {
-        for (int c = 0; c < 3; ++c) {
-            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
-        }
-    }
-    return gains;
-}
-
 Rgb Body::gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const {
     if (!thin) return compensation_gain(compensation, coverage, total_reflectance);
     Compensation full = compensation;
@@ -248,7 +235,7 @@ void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered
 }
 
 TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups,
-                             const RayScene& ray_scene, bool wants_depth, bool wants_surface, PointGatherPlan plan,
+                             const RayScene& ray_scene, bool wants_depth, bool wants_surface,
                              std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
                              const std::function<void(std::size_t)>& has_taken) {
     Stopwatch watch(stats.seconds["tree"]);
@@ -270,11 +257,7 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
         const std::size_t leader = sets.leader(i);
         body.to_points = sets.points(leader).to_cloud();
         if (!sets.is_leader(i)) {
-            body.tree = bodies[leader]->tree;
-            body.surface_tree = bodies[leader]->surface_tree;
-            body.thickness = bodies[leader]->thickness;
-            body.at_points = bodies[leader]->at_points;
-            body.inside = bodies[leader]->inside;
+            body.trees = bodies[leader]->trees;
             continue;
         }
         const bool is_alone = !sets.shells(i);
@@ -286,21 +269,35 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
                              sets.united(i, groups, [&](std::size_t k) { return &lit[k].irradiance; }), groups,
                              sets.united(i, groups, [&](std::size_t k) { return &lit[k].moments; }), is_on_surface);
         };
-        body.tree = plant(false);
+        body.trees.light = plant(false);
         const Compensation& compensation = body.material->compensation;
         if (wants_surface || !keeps_energy(compensation.mode) || compensation.strength < 1.0f) {
-            body.surface_tree = plant(true);
+            body.trees.on_surface = plant(true);
         }
         if (is_alone) has_taken(i);
         if (wants_depth || compensation.mode == CompensationMode::depth) {
-            body.thickness = thickness.of(i);
+            body.trees.thickness = thickness.of(i);
+        }
+        stats.points += body.trees.light->point_count();
+        stats.nodes += body.trees.light->node_count();
+    }
+    return sets;
+}
+
+void add_gathers(const TranslucencySets& sets, std::size_t groups, PointGatherPlan plan,
+                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats) {
+    Stopwatch watch(stats.seconds["tree"]);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (!bodies[i] || !bodies[i]->trees.light) continue;
+        Body& body = *bodies[i];
+        if (!sets.is_leader(i)) {
+            body.at_points = bodies[sets.leader(i)]->at_points;
+            body.inside = bodies[sets.leader(i)]->inside;
+            continue;
         }
         body.at_points = PointGathers::make(body, sets.points(i).cloud(), groups, plan);
         if (body.at_points) body.inside = std::make_shared<const InnerGathers>(body, groups, plan.options_for(body));
-        stats.points += body.tree->point_count();
-        stats.nodes += body.tree->node_count();
     }
-    return sets;
 }
 
 std::vector<Passage> passages_of(const Scene& scene) {

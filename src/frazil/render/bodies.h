@@ -15,6 +15,7 @@
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/lighting/irradiance.h"
 #include "frazil/material/microfacet.h"
+#include "frazil/render/core_sums.h"
 #include "frazil/render/inner_gathers.h"
 #include "frazil/render/options.h"
 #include "frazil/render/placed_points.h"
@@ -49,13 +50,8 @@ struct Body {
     std::shared_ptr<const DirectionalAlbedo> white_by_angle;  // were nothing absorbed
     // Trees stand where their points do: places are brought there by `to_points`.
     M44f to_points;
-    std::shared_ptr<const PointTree> tree;  // none where the object has no surface; one for a translucency set
-    // The same light on the surface itself, where sums are asked for that are not divided by their coverage.
-    std::shared_ptr<const PointTree> surface_tree;
-    std::shared_ptr<const PointTree> thickness;  // ThicknessTrees
-    // plant_overlay_trees, where such layers are asked for; which layers its columns are.
-    std::shared_ptr<const PointTree> overlay_tree;
-    std::vector<std::uint32_t> overlay_layers;
+    CoreTrees trees;
+    std::vector<std::uint32_t> overlay_layers;  // which the columns of trees.overlays are
     // Light of one scattering that rays trace and the profile leaves out: its plane albedo, over irradiance; and what the
     // core's radiance is scaled by, so that it averages to the exitance less what each ray finds to be scattered once.
     float traced = 0.0f;  // how much of it
@@ -85,6 +81,8 @@ struct Body {
     // How far inwards that is, on the mean over light from all around.
     float depth() const;
     float sigma_t() const;  // mean over channels
+    // Of the channel that scatters and absorbs most.
+    float mean_free_path() const;
 
     // What enters at this angle of the light outside, weighted by how much of it leaves the core again.
     Rgb enters(float cos_theta, float roughness) const;
@@ -145,9 +143,6 @@ class ThicknessTrees {
     std::map<Key, std::shared_ptr<const std::vector<Rgb>>> gains_;
 };
 
-// The mean gain around each position (where the tree stands), from such a tree; empty without one.
-std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
-                                 const GatherOptions& options);
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is
 // seen. So bounces keep energy, and a picture's compensation can be changed exactly after its render. `gains` as above.
 void compensate_bounce(const Body& body, const std::vector<Rgb>& gains, Gathered& gathered);
@@ -159,12 +154,16 @@ std::vector<Passage> passages_of(const Scene& scene);
 std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene);
 
 // Give every body the tree of its points, (N, groups) of light each, and that of its thickness where its compensation has a
-// use for it or a layer `wants_depth`; that of its surface where its compensation has, or a layer `wants_surface`; and the gathers at its points, where the plan wants them. `has_taken(i)` is called
-// when the light of an object is needed no more. Fills points, nodes and seconds of the stats. Returns which bodies share
-// their tree; it refers to what was given.
+// use for it or a layer `wants_depth`; that of its surface where its compensation has, or a layer `wants_surface`. `has_taken(i)`
+// is called when the light of an object is needed no more. Fills points, nodes and seconds of the stats. Returns which
+// bodies share their tree; it refers to what was given.
 TranslucencySets plant_trees(
     const Scene& scene, const std::vector<LitPoints>& lit, std::size_t groups, const RayScene& ray_scene,
-    bool wants_depth, bool wants_surface, PointGatherPlan plan, std::vector<std::unique_ptr<Body>>& bodies,
-    RenderStats& stats, const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});
+    bool wants_depth, bool wants_surface, std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats,
+    const std::function<void(std::size_t)>& has_taken = [](std::size_t) {});
+
+// Give every body that has its trees, of so many light groups, the gathers at its points where the plan wants them.
+void add_gathers(const TranslucencySets& sets, std::size_t groups, PointGatherPlan plan,
+                 std::vector<std::unique_ptr<Body>>& bodies, RenderStats& stats);
 
 }  // namespace frazil

@@ -13,13 +13,16 @@ namespace {
 // shorter: exitance is linear over it within one or two thousandths.
 constexpr float kCell = 0.5f;
 
+// Of normals of places that share a blend.
+constexpr float kLeastCosine = 0.9f;
+
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 // What the requests of one body are answered with, and which row each takes.
 struct Answers {
-    Gathered gathered, at_surface;  // the latter where the body has a surface_tree
-    std::vector<Rgb> thin;          // thickness_gains; empty where the body has none
+    CoreSums sums;
     std::vector<std::uint32_t> row_of;
+    std::size_t gathers;  // the first rows; the others are blends
 };
 
 std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
@@ -29,7 +32,7 @@ std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
 
 // Each place that requests without a row ask for once, as deep as these tell and on the surface.
 struct Places {
-    std::vector<V3f> below, surface;
+    std::vector<V3f> below, on_surface;
 };
 
 Places shared_places(std::span<const GatherRequest> requests, float cell, std::vector<std::uint32_t>& row_of) {
@@ -56,117 +59,124 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
             row_of[keys[end].request] = static_cast<std::uint32_t>(places.below.size());
         }
         places.below.emplace_back((sum + inwards) / double(end - begin));
-        places.surface.emplace_back(sum / double(end - begin));
+        places.on_surface.emplace_back(sum / double(end - begin));
     }
     return places;
 }
 
-template <class Value>
-void append(std::vector<Value>& values, const std::vector<Value>& more) {
-    values.insert(values.end(), more.begin(), more.end());
+bool is_close(const GatherRequest& a, const GatherRequest& b, float distance) {
+    return a.pixel == b.pixel && (a.position - b.position).length2() < distance * distance &&
+           a.normal.dot(b.normal) > kLeastCosine;
 }
 
 // Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and those
 // of a lattice inside.
-// `places` are those that are gathered here: the first rows.
-Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options,
-                    std::vector<V3f>& places) {
-    Answers answers;
-    answers.row_of.assign(requests.size(), kNoRow);
-    Gathered blended;
-    std::vector<Rgb> blended_thin;
-    std::vector<std::uint32_t> is_blended;
+Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options) {
+    std::vector<std::uint32_t> row_of(requests.size(), kNoRow), is_blended;
+    SumColumns columns;
+    if (body.at_points) {
+        columns = body.at_points->columns();
+        columns.overlays = body.trees.overlays ? body.overlay_layers.size() * columns.groups : 0;
+    }
+    CoreSums blended(columns);
+    std::uint32_t last_seen = kNoRow;  // of the requests that the camera itself makes
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
-        if (request.is_primary) continue;
+        if (request.is_primary && !body.at_points->serves_camera()) continue;
+        // What one pixel shows lies close together.
+        if (request.is_primary && last_seen < i && is_close(requests[last_seen], request, kCell * body.spacing)) {
+            row_of[i] = row_of[last_seen];
+            is_blended.push_back(i);
+            continue;
+        }
         const V3f position = request.position * body.to_points;
         V3f normal;
         body.to_points.multDirMatrix(request.normal, normal);
-        if (!body.at_points->append(position, normal, blended, blended_thin)) {
-            body.inside->append(position, blended, blended_thin);
+        if (!body.at_points->append(position, normal, request.is_primary, blended)) {
+            if (request.is_primary) continue;
+            body.inside->append(position, blended);
         }
-        answers.row_of[i] = static_cast<std::uint32_t>(blended.coverage.size() - 1);
+        row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
         is_blended.push_back(i);
+        if (request.is_primary) last_seen = i;
     }
-    const float mean_free_path = 1.0f / max_component(body.medium.sigma_s_prime + body.medium.sigma_a);
-    Places shared = shared_places(requests, kCell * std::min(body.spacing, mean_free_path), answers.row_of);
-    places = std::move(shared.below);
-    const std::vector<V3f> at_tree = moved(places, body.to_points);
-    answers.gathered = body.tree->gather(at_tree.data(), at_tree.size(), options);
-    if (body.surface_tree) {
-        const std::vector<V3f> there = moved(std::move(shared.surface), body.to_points);
-        answers.at_surface = body.surface_tree->gather(there.data(), there.size(), options);
-    }
-    answers.thin = thickness_gains(body.thickness.get(), at_tree.data(), at_tree.size(), options);
-    append(answers.gathered.exitance, blended.exitance);
-    append(answers.gathered.coverage, blended.coverage);
-    append(answers.gathered.layers, blended.layers);
-    append(answers.thin, blended_thin);
-    for (const std::uint32_t i : is_blended) answers.row_of[i] += static_cast<std::uint32_t>(places.size());
-    return answers;
+    const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
+    CoreSums sums =
+        gather_core(body.trees, moved(places.below, body.to_points), moved(places.on_surface, body.to_points), options);
+    sums.append(blended);
+    for (const std::uint32_t i : is_blended) row_of[i] += static_cast<std::uint32_t>(places.below.size());
+    return {std::move(sums), std::move(row_of), places.below.size()};
 }
 
-// Light of the core at a row of answers, as a compensation has it: sums that it divides by their coverage stand inwards, others
+// What the sums of a place are scaled by, those below and those on the surface, to be exitance.
+struct Scales {
+    Rgb below = Rgb(0.0f), on_surface = Rgb(0.0f);
+};
+
+// Light of the core at a row of sums, as a compensation has it: sums that it divides by their coverage stand inwards, others
 // on the surface.
 class Exitance {
   public:
-    Exitance(const Body& body, const Answers& answers, std::size_t row)
-        : body_(body), answers_(answers), row_(row), thin_(answers.thin.empty() ? nullptr : &answers.thin[row]) {}
+    Exitance(const Body& body, const CoreSums& sums, std::size_t row)
+        : body_(body),
+          below_(sums.below(row)),
+          on_surface_(sums.on_surface(row)),
+          has_surface_(sums.columns().has_surface),
+          thin_(sums.thin(row)),
+          overlays_(sums.overlays(row)) {}
 
+    std::size_t groups() const { return below_.groups; }
+    std::size_t knots() const { return std::max<std::size_t>(below_.knots, 1); }
     // W on the surface, if it is known there.
-    const Rgb& coverage() const {
-        return (answers_.at_surface.coverage.empty() ? answers_.gathered : answers_.at_surface).coverage[row_];
+    const Rgb& coverage() const { return on_surface_.coverage(); }
+
+    Scales scales(const Compensation& compensation) const {
+        if (!has_surface_) return {gain(compensation, below_), Rgb(0.0f)};
+        if (!keeps_energy(compensation.mode)) return {Rgb(0.0f), gain(compensation, on_surface_)};
+        Compensation full = compensation;
+        full.strength = 1.0f;
+        return {gain(full, below_) * compensation.strength, Rgb(1.0f - compensation.strength)};
     }
-    Rgb operator()(const Compensation& compensation, std::size_t group) const {
-        return of(compensation, [&](const Gathered& sums) { return exitance(sums, group); });
+    Rgb operator()(const Scales& scales, std::size_t group) const {
+        return below_.exitance(group) * scales.below + on_surface_.exitance(group) * scales.on_surface;
     }
     // The part of a ramp's knot.
-    Rgb knot(const Compensation& compensation, std::size_t knot, std::size_t group) const {
-        return of(compensation, [&](const Gathered& sums) {
-            return sums.knots > 0 ? sums.layers[(row_ * sums.knots + knot) * sums.groups + group]
-                                  : exitance(sums, group);
-        });
+    Rgb knot(const Scales& scales, std::size_t knot, std::size_t group) const {
+        return below_.knot(knot, group) * scales.below + on_surface_.knot(knot, group) * scales.on_surface;
     }
-    // What the sums below the surface are scaled by, all groups together.
-    Rgb gain_below(const Compensation& compensation) const {
-        if (answers_.at_surface.coverage.empty()) return gain(compensation, answers_.gathered);
+    // As it is summed where light is scattered first.
+    const Rgb& below(std::size_t group) const { return below_.exitance(group); }
+    // What that is scaled by, all groups together.
+    Rgb gain_below(const Scales& scales) const {
+        if (scales.on_surface == Rgb(0.0f)) return scales.below;
         Rgb whole(0.0f), sums(0.0f), scale(0.0f);
-        for (std::size_t group = 0; group < answers_.gathered.groups; ++group) {
-            whole += (*this)(compensation, group);
-            sums += exitance(answers_.gathered, group);
+        for (std::size_t group = 0; group < groups(); ++group) {
+            whole += (*this)(scales, group);
+            sums += below(group);
         }
         for (int c = 0; c < 3; ++c) scale[c] = sums[c] != 0.0f ? whole[c] / sums[c] : 0.0f;
         return scale;
     }
+    // What overlays take of it, (layers, groups); null without.
+    const Rgb* overlays() const { return overlays_; }
 
   private:
-    template <class Value>
-    Rgb of(const Compensation& compensation, const Value& value) const {
-        const Rgb below = value(answers_.gathered);
-        if (answers_.at_surface.coverage.empty()) return below * gain(compensation, answers_.gathered);
-        const Rgb surface = value(answers_.at_surface);
-        if (!keeps_energy(compensation.mode)) return surface * gain(compensation, answers_.at_surface);
-        Compensation full = compensation;
-        full.strength = 1.0f;
-        return surface + (below * gain(full, answers_.gathered) - surface) * compensation.strength;
-    }
-    Rgb exitance(const Gathered& sums, std::size_t group) const { return sums.exitance[row_ * sums.groups + group]; }
-    Rgb gain(const Compensation& compensation, const Gathered& sums) const {
-        return body_.gain(compensation, sums.coverage[row_],
+    Rgb gain(const Compensation& compensation, const TreeSums& sums) const {
+        return body_.gain(compensation, sums.coverage(),
                           compensation.mode == CompensationMode::depth ? thin_ : nullptr);
     }
 
     const Body& body_;
-    const Answers& answers_;
-    std::size_t row_;
-    const Rgb* thin_;
+    TreeSums below_, on_surface_;  // the latter is the former where there is none
+    bool has_surface_;
+    const Rgb *thin_, *overlays_;
 };
 
 }  // namespace
 
 struct Gathering::Answer {
-    const Answers& answers;
-    Exitance exitance;
+    const Exitance& exitance;
+    const Scales& rendered;
 };
 
 void Gathering::answer(const GatherOptions& options, Tile& tile) const {
@@ -179,36 +189,27 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         while (end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object) ++end;
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
-        std::vector<V3f> places;
-        const Answers answers =
-            answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers, places);
-        const Gathered& gathered = answers.gathered;
-        tile.gathers += places.size();
-        Gathered by_overlay;
-        if (body.overlay_tree) {
-            const std::vector<V3f> at_tree = moved(places, body.to_points);
-            by_overlay = body.overlay_tree->gather(at_tree.data(), at_tree.size(), options);
-        }
+        const Answers answers = answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers);
+        tile.gathers += answers.gathers;
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = tile.requests[i];
-            const std::size_t row = answers.row_of[i - begin];
-            const Answer answer{answers, Exitance(body, answers, row)};
+            const Exitance exitance(body, answers.sums, answers.row_of[i - begin]);
+            const Scales scales = exitance.scales(body.material->compensation);
             tile.subset = request.subset;
-            const Rgb& coverage = answer.exitance.coverage();
-            const Compensation& compensation = body.material->compensation;
-            const Rgb gain = answer.exitance.gain_below(compensation);
-            const Rgb fill = fill_amount(compensation, coverage, body.total_reflectance) * request.entering;
-            for (std::size_t group = 0; group < gathered.groups; ++group) {
-                Rgb exitance = answer.exitance(compensation, group);
-                if (group == request.entering_group) exitance += fill;
-                tile.add(request.pixel, Component::translucency, group, exitance * request.translucency);
-                tile.add(request.pixel, Component::diffuse, group, exitance * request.diffuse);
-                tile.add(request.pixel, Component::specular, group, exitance * request.specular);
-                tile.add(request.pixel, Component::refraction, group, exitance * request.refraction);
+            const Rgb& coverage = exitance.coverage();
+            const Rgb fill =
+                fill_amount(body.material->compensation, coverage, body.total_reflectance) * request.entering;
+            for (std::size_t group = 0; group < exitance.groups(); ++group) {
+                Rgb light = exitance(scales, group);
+                if (group == request.entering_group) light += fill;
+                tile.add(request.pixel, Component::translucency, group, light * request.translucency);
+                tile.add(request.pixel, Component::diffuse, group, light * request.diffuse);
+                tile.add(request.pixel, Component::specular, group, light * request.specular);
+                tile.add(request.pixel, Component::refraction, group, light * request.refraction);
                 for (const auto& [lpe, state, weight] : request.lpes) {
                     if (!layout_.lpes[lpe].ends_in_group(state, group)) continue;
-                    tile.add_lpe(request.pixel, lpe, exitance * weight);
+                    tile.add_lpe(request.pixel, lpe, light * weight);
                 }
             }
             if (request.is_primary) {
@@ -217,18 +218,16 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
                 for (int c = 0; c < 3; ++c) lacking[c] = total[c] > 0.0f ? 1.0f - coverage[c] / total[c] : 0.0f;
                 tile.add_coverage(request.pixel, coverage * request.samples, lacking * request.samples);
             }
-            add_overlays(request, &gathered.exitance[row * gathered.groups], gathered.groups, gain, fill, tile);
-            if (request.is_primary && body.overlay_tree) {
-                add_taken(request, &by_overlay.exitance[row * by_overlay.groups], gathered.groups, gain, tile);
-            }
+            const Answer answer{exitance, scales};
+            add_overlays(request, answer, fill, tile);
             if (layout_.ice_plane_count() == 0) continue;
             const Rgb elsewhere = request.diffuse + request.specular + request.refraction;
             if (request.is_primary) add_planes(request, request.translucency, 0, answer, tile);
             if (elsewhere != Rgb(0.0f)) {
                 add_planes(request, elsewhere, layout_.seen_plane_count(), answer, tile);
-                for (std::size_t group = 0; group < gathered.groups; ++group) {
-                    const Rgb exitance = answer.exitance(compensation, group);
-                    tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, group, exitance * elsewhere);
+                for (std::size_t group = 0; group < exitance.groups(); ++group) {
+                    tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, group,
+                                      exitance(scales, group) * elsewhere);
                 }
                 tile.add_to_plane(request.pixel, layout_.ice_plane_count() - 1, request.entering_group,
                                   fill * elsewhere);
@@ -240,11 +239,14 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
 }
 
 // What a change of each overlay's opacity adds to light that came by way of it.
-void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, std::size_t groups, const Rgb& gain,
-                             const Rgb& fill, Tile& tile) const {
+void Gathering::add_overlays(const GatherRequest& request, const Answer& answer, const Rgb& fill, Tile& tile) const {
+    const Exitance& exitance = answer.exitance;
+    const bool is_taken_from = request.is_primary && exitance.overlays();
+    if (request.overlays.empty() && !is_taken_from) return;
+    const Rgb gain = exitance.gain_below(answer.rendered);
     for (const GatherRequest::Overlay& overlay : request.overlays) {
-        for (std::size_t group = 0; group < groups; ++group) {
-            Rgb light = exitance[group] * gain;
+        for (std::size_t group = 0; group < exitance.groups(); ++group) {
+            Rgb light = exitance.below(group) * gain;
             if (group == request.entering_group) light += fill;
             const auto add = [&](FilmLayout::OverlayPlane plane, const Rgb& change) {
                 tile.add_to_plane(request.pixel, overlay.plane + plane, group, change);
@@ -254,13 +256,14 @@ void Gathering::add_overlays(const GatherRequest& request, const Rgb* exitance, 
             add(FilmLayout::kRefraction, light * request.refraction * overlay.seen_through);
         }
     }
+    if (is_taken_from) add_taken(request, answer, gain, tile);
 }
 
 // What it takes from the light that enters the points around here, be the overlay here or on another member of the
-// translucency set. `taken` is (layers, groups).
-void Gathering::add_taken(const GatherRequest& request, const Rgb* taken, std::size_t groups, const Rgb& gain,
-                          Tile& tile) const {
+// translucency set.
+void Gathering::add_taken(const GatherRequest& request, const Answer& answer, const Rgb& gain, Tile& tile) const {
     const std::vector<std::uint32_t>& layers = bodies_[request.object]->overlay_layers;
+    const std::size_t groups = answer.exitance.groups();
     for (std::size_t k = 0; k < layers.size(); ++k) {
         const std::size_t plane = layout_.overlay_plane(layers[k]);
         Rgb here(0.0f);  // the overlay's own change of what comes from the core
@@ -268,7 +271,7 @@ void Gathering::add_taken(const GatherRequest& request, const Rgb* taken, std::s
             if (overlay.plane == plane) here = overlay.core;
         }
         for (std::size_t group = 0; group < groups; ++group) {
-            const Rgb less = taken[k * groups + group] * gain * request.translucency;
+            const Rgb less = answer.exitance.overlays()[k * groups + group] * gain * request.translucency;
             tile.add_to_plane(request.pixel, plane + FilmLayout::kTranslucency, group, less);
             tile.add_to_plane(request.pixel, plane + FilmLayout::kSquared, group, less * here);
         }
@@ -279,18 +282,17 @@ void Gathering::add_taken(const GatherRequest& request, const Rgb* taken, std::s
 // is radiance per exitance, `base` the first plane.
 void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Answer& answer,
                            Tile& tile) const {
-    const Gathered& gathered = answer.answers.gathered;
+    const Exitance& exitance = answer.exitance;
     const Body& body = *bodies_[request.object];
     const Compensation& rendered = body.material->compensation;
-    const Rgb& coverage = answer.exitance.coverage();
     const auto fill_of = [&](const Compensation& compensation) {
-        return fill_amount(compensation, coverage, body.total_reflectance) * request.entering * weight;
+        return fill_amount(compensation, exitance.coverage(), body.total_reflectance) * request.entering * weight;
     };
     if (!layout_.knots.empty()) {
         const std::size_t first = base + layout_.first_knot[scene_.objects[request.object].material];
-        for (std::size_t k = 0; k < std::max<std::size_t>(gathered.knots, 1); ++k) {
-            for (std::size_t g = 0; g < gathered.groups; ++g) {
-                tile.add_to_plane(request.pixel, first + k, g, answer.exitance.knot(rendered, k, g) * weight);
+        for (std::size_t k = 0; k < exitance.knots(); ++k) {
+            for (std::size_t g = 0; g < exitance.groups(); ++g) {
+                tile.add_to_plane(request.pixel, first + k, g, exitance.knot(answer.rendered, k, g) * weight);
             }
         }
         if (layout_.fill_plane != FilmLayout::kNone) {
@@ -301,9 +303,10 @@ void Gathering::add_planes(const GatherRequest& request, const Rgb& weight, std:
         Compensation full = rendered;
         full.mode = layout_.modes[m];
         full.strength = 1.0f;
+        const Scales scales = exitance.scales(full);
         const std::size_t plane = base + layout_.knots.size() + m;
-        for (std::size_t g = 0; g < gathered.groups; ++g) {
-            tile.add_to_plane(request.pixel, plane, g, answer.exitance(full, g) * weight);
+        for (std::size_t g = 0; g < exitance.groups(); ++g) {
+            tile.add_to_plane(request.pixel, plane, g, exitance(scales, g) * weight);
         }
         tile.add_to_plane(request.pixel, plane, request.entering_group, fill_of(full));
     }

@@ -30,10 +30,8 @@ class Gathering {
     void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Answer& answer,
                     Tile& tile) const;
 
-    void add_overlays(const GatherRequest& request, const Rgb* exitance, std::size_t groups, const Rgb& gain,
-                      const Rgb& fill, Tile& tile) const;
-    void add_taken(const GatherRequest& request, const Rgb* taken, std::size_t groups, const Rgb& gain,
-                   Tile& tile) const;
+    void add_overlays(const GatherRequest& request, const Answer& answer, const Rgb& fill, Tile& tile) const;
+    void add_taken(const GatherRequest& request, const Answer& answer, const Rgb& gain, Tile& tile) const;
 
     const Scene& scene_;
     const std::vector<std::unique_ptr<Body>>& bodies_;

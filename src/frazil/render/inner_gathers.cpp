@@ -20,11 +20,11 @@ std::size_t InnerGathers::PlaceHash::operator()(const Place& place) const {
 }
 
 InnerGathers::InnerGathers(const Body& body, std::size_t groups, const GatherOptions& options)
-    : tree_(body.tree), thickness_(body.thickness), options_(options) {
-    cell_ = kCell / double(max_component(body.medium.sigma_s_prime + body.medium.sigma_a));
-    const std::size_t knots = options.ramp_layers ? body.material->ramp.distances.size() : 0;
-    const std::size_t colors = groups * (1 + knots) + 2;
-    most_bricks_per_shelf_ = kMostBytes / kShelves / (kNodes * kNodes * kNodes * colors * sizeof(Rgb));
+    : trees_(body.trees), options_(options) {
+    trees_.overlays = nullptr;
+    columns_ = columns_of(trees_, groups, options.ramp_layers ? body.material->ramp.distances.size() : 0);
+    cell_ = kCell * double(body.mean_free_path());
+    most_bricks_per_shelf_ = kMostBytes / kShelves / (kNodes * kNodes * kNodes * columns_.count() * sizeof(Rgb));
 }
 
 std::shared_ptr<const InnerGathers::Brick> InnerGathers::gather_brick(const Place& place) const {
@@ -38,10 +38,7 @@ std::shared_ptr<const InnerGathers::Brick> InnerGathers::gather_brick(const Plac
             }
         }
     }
-    auto result = std::make_shared<Brick>();
-    result->at_nodes = tree_->gather(nodes.data(), nodes.size(), options_);
-    result->thin = thickness_gains(thickness_.get(), nodes.data(), nodes.size(), options_);
-    return result;
+    return std::make_shared<const Brick>(gather_core(trees_, nodes, nodes, options_));
 }
 
 std::shared_ptr<const InnerGathers::Brick> InnerGathers::brick(const Place& place) const {
@@ -59,7 +56,7 @@ std::shared_ptr<const InnerGathers::Brick> InnerGathers::brick(const Place& plac
     return shelf.bricks.try_emplace(place, made).first->second;
 }
 
-void InnerGathers::append(const V3f& position, Gathered& gathered, std::vector<Rgb>& thin) const {
+void InnerGathers::append(const V3f& position, CoreSums& rows) const {
     Place place;
     std::size_t first[3];  // the lower node about the position, within its brick
     float beyond[3];       // of a cell
@@ -71,25 +68,13 @@ void InnerGathers::append(const V3f& position, Gathered& gathered, std::vector<R
         beyond[axis] = static_cast<float>(at - floor);
     }
     const std::shared_ptr<const Brick> here = brick(place);
-    const Gathered& nodes = here->at_nodes;
-    const std::size_t groups = nodes.groups, layers = nodes.knots * groups, row = gathered.coverage.size();
-    gathered.exitance.resize((row + 1) * groups, Rgb(0.0f));
-    gathered.coverage.resize(row + 1, Rgb(0.0f));
-    gathered.layers.resize((row + 1) * layers, Rgb(0.0f));
-    if (!here->thin.empty()) thin.resize(row + 1, Rgb(0.0f));
+    Rgb* row = rows.add_row();
     for (std::size_t corner = 0; corner < 8; ++corner) {
         const std::size_t step[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
         float weight = 1.0f;
         for (int axis = 0; axis < 3; ++axis) weight *= step[axis] ? beyond[axis] : 1.0f - beyond[axis];
         const std::size_t node = ((first[2] + step[2]) * kNodes + first[1] + step[1]) * kNodes + first[0] + step[0];
-        for (std::size_t g = 0; g < groups; ++g) {
-            gathered.exitance[row * groups + g] += nodes.exitance[node * groups + g] * weight;
-        }
-        gathered.coverage[row] += nodes.coverage[node] * weight;
-        for (std::size_t k = 0; k < layers; ++k) {
-            gathered.layers[row * layers + k] += nodes.layers[node * layers + k] * weight;
-        }
-        if (!here->thin.empty()) thin[row] += here->thin[node] * weight;
+        add_weighted(row, here->row(node), columns_.count(), weight);
     }
 }
 

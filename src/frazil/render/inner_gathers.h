@@ -2,7 +2,7 @@
 // Model: exitance varies over mean free paths, inside as on the surface, and places inside are met one here, one there, so
 //   that a gather at each is dear: a lattice of 0.4 mean free paths, gathered brick by brick where paths come by, and
 //   interpolated linearly.
-// Units: as Gathered; metres, where the body's trees stand.
+// Units: as CoreSums; metres, where the body's trees stand.
 // Valid: thread-safe; a brick's values are the same whoever asks for it first. Within 1 % RMS of a gather
 //   right there, .2 % on the mean (tests/cpp/test_inner_gathers.cpp).
 // Not: places on the surface (point_gathers.h).
@@ -14,7 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "frazil/translucency/point_tree.h"
+#include "frazil/render/core_sums.h"
 
 namespace frazil {
 
@@ -25,14 +25,13 @@ class InnerGathers {
     // The body has its trees already, of so many light groups.
     InnerGathers(const Body& body, std::size_t groups, const GatherOptions& options);
 
-    // Append the row of a place to `gathered` and `thin` (thickness_gains; left empty where the body has none).
-    void append(const V3f& position, Gathered& gathered, std::vector<Rgb>& thin) const;
+    // Without overlays, which only the camera asks for.
+    const SumColumns& columns() const { return columns_; }
+    // Append the row of a place; `rows` begin with these columns.
+    void append(const V3f& position, CoreSums& rows) const;
 
   private:
-    struct Brick {
-        Gathered at_nodes;
-        std::vector<Rgb> thin;
-    };
+    using Brick = CoreSums;  // at its nodes
     using Place = std::array<std::int64_t, 3>;
     struct PlaceHash {
         std::size_t operator()(const Place& place) const;
@@ -47,7 +46,8 @@ class InnerGathers {
     std::shared_ptr<const Brick> brick(const Place& place) const;
     std::shared_ptr<const Brick> gather_brick(const Place& place) const;
 
-    std::shared_ptr<const PointTree> tree_, thickness_;
+    CoreTrees trees_;
+    SumColumns columns_;
     GatherOptions options_;
     double cell_ = 0.0;                      // of the lattice, metres
     std::size_t most_bricks_per_shelf_ = 0;  // that are kept; the rest is gathered whenever it is asked for

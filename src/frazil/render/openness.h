@@ -1,15 +1,20 @@
 // The layers `occlusion` and `bent_normal`: how much of the hemisphere is open where the camera looks first, and whereto.
-// Model: on ice, baked by rays at its points and gathered from there with a kernel as wide as their spacing, without
-//   noise; on other surfaces one ray a sample, drawn by the cosine (lighting/occlusion.h).
+// Model: on ice, baked by rays at its points and blended from there, without noise (points/point_blend.h; gathered with a
+//   kernel as wide as their spacing where that varies); on other surfaces one ray a sample, drawn by the cosine
+//   (lighting/occlusion.h).
 // Units: openness 0 (all hidden) to 1; world space.
 // Valid: thread-safe after construction, a tile a thread. Whatever the distance, every surface hides.
-// Not: sheets of ice thinner than the spacing of their points: both sides share what they see.
+// Not: sheets of ice thinner than the spacing of their points, where that varies: both sides share what they see.
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "frazil/geometry/ray_scene.h"
+#include "frazil/lighting/occlusion.h"
+#include "frazil/points/point_blend.h"
 #include "frazil/render/bodies.h"
 #include "frazil/render/tile.h"
 
@@ -24,8 +29,21 @@ class Openness {
     void answer(Tile& tile) const;
 
   private:
+    // Of the points of a body.
+    struct Baked {
+        Baked(const PointSet& points, const Occlusion& occlusion);
+
+        std::optional<PointBlend> blend;
+        std::vector<float> openness;  // in the order of the blend
+        std::vector<V3f> directions;
+        std::unique_ptr<const PointTree> tree;  // where the spacing varies
+    };
+    void blend(const Baked& baked, std::span<const SeenPlace> places, Tile& tile) const;
+    void gather(const PointTree& tree, std::span<const SeenPlace> places, Tile& tile) const;
+    void trace(std::span<const SeenPlace> places, Tile& tile) const;
+
     const RayScene& scene_;
-    std::vector<std::unique_ptr<const PointTree>> trees_;  // by object; null for other surfaces
+    std::vector<std::unique_ptr<const Baked>> baked_;  // by object; null for other surfaces
 };
 
 }  // namespace frazil

@@ -86,13 +86,13 @@ void plant_overlay_trees(const Scene& scene, const std::vector<LitPoints>& lit, 
             return sets.united(i, columns, of);
         };
         bodies[i]->overlay_layers = layers[i];
-        bodies[i]->overlay_tree = make_tree(sets.points(i), bodies[i]->kernel, all_taken(&LitPoints::irradiance),
-                                            columns, all_taken(&LitPoints::moments));
+        bodies[i]->trees.overlays = make_tree(sets.points(i), bodies[i]->kernel, all_taken(&LitPoints::irradiance),
+                                              columns, all_taken(&LitPoints::moments));
     }
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (!bodies[i] || sets.is_leader(i)) continue;
         bodies[i]->overlay_layers = bodies[sets.leader(i)]->overlay_layers;
-        bodies[i]->overlay_tree = bodies[sets.leader(i)]->overlay_tree;
+        bodies[i]->trees.overlays = bodies[sets.leader(i)]->trees.overlays;
     }
 }
 

@@ -184,7 +184,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         add_matte(path, std::size_t(core.body), share, tile);
     }
     const Body& body = *bodies_[std::size_t(core.body)];
-    if (!body.tree || body.material->translucency == 0.0f) return;
+    if (!body.trees.light || body.material->translucency == 0.0f) return;
 
     GatherRequest request;
     request.object = static_cast<std::uint32_t>(core.body);

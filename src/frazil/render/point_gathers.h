@@ -1,18 +1,17 @@
 // What ice sends from each of its points, gathered once, for places that the camera sees by way of other surfaces.
 // Model: such places are many and lie anywhere, so that no traversal serves several of them. Exitance varies over mean free
 //   paths, and points are nearer to each other than that: a mean of the points around a place, by a kernel as wide as one
-//   and a half spacings, comes within a few thousandths of a gather right there. Sums, coverage and layers are blended
-//   before anything is done with them, so that what is made of them stays linear in the light.
-// Units: as Gathered; metres.
+//   and a half spacings, comes within a few thousandths of a gather right there.
+// Units: as CoreSums; metres.
 // Valid: thread-safe after construction.
-// Not: what the camera sees itself, which is gathered where it is seen.
+// Not: what the camera sees itself, unless points are dense: it is gathered where it is seen.
 #pragma once
 
 #include <memory>
 #include <vector>
 
-#include "frazil/points/point_lookup.h"
-#include "frazil/translucency/point_tree.h"
+#include "frazil/points/point_blend.h"
+#include "frazil/render/core_sums.h"
 
 namespace frazil {
 
@@ -36,17 +35,21 @@ class PointGathers {
     static std::shared_ptr<const PointGathers> make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                     PointGatherPlan& plan);
 
-    // Append to `gathered` and `thin` (thickness_gains; left empty where the body has none) the row of a place on the
-    // surface with this outward normal; false where no point is near.
-    bool append(const V3f& position, const V3f& normal, Gathered& gathered, std::vector<Rgb>& thin) const;
+    // Whether points are so near to each other, in mean free paths, that a blend of them is as near to a gather as its
+    // tolerance: then it serves the camera too, with overlays.
+    bool serves_camera() const { return serves_camera_; }
+    const SumColumns& columns() const { return at_points_.columns(); }
+
+    // Append the row of a place on the surface with this outward normal; false where no point is near. `rows` begin with these
+    // columns; overlays, if there are any, are left out where they are not asked for.
+    bool append(const V3f& position, const V3f& normal, bool with_overlays, CoreSums& rows) const;
 
   private:
-    PointGathers(const PointSet& points, float reach) : lookup_(points, reach), reach_(reach) {}
+    PointGathers(PointBlend blend, const SumColumns& columns) : blend_(std::move(blend)), at_points_(columns) {}
 
-    PointLookup lookup_;
-    float reach_;
-    Gathered at_points_;  // in the order of the lookup
-    std::vector<Rgb> thin_;
+    PointBlend blend_;
+    bool serves_camera_ = false;
+    CoreSums at_points_;  // in the order of the blend
 };
 
 }  // namespace frazil

@@ -276,10 +276,14 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const bool has_overlays = layout.has("overlay");
     const auto plant = [&](const std::vector<LitPoints>& lit, const std::function<void(std::size_t)>& has_taken) {
         const double paths = double(options.width) * options.height * options.samples;
-        const TranslucencySets sets =
-            plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(), layout.needs_surface(),
-                        {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies, stats, has_taken);
-        if (has_overlays) plant_overlay_trees(scene, lit, sets, layout.overlay_of, groups.size(), bodies);
+        const TranslucencySets sets = plant_trees(scene, lit, groups.size(), ray_scene, layout.needs_depth(),
+                                                  layout.needs_surface(), bodies, stats, has_taken);
+        if (has_overlays) {
+            Stopwatch watch(stats.seconds["tree"]);
+            plant_overlay_trees(scene, lit, sets, layout.overlay_of, groups.size(), bodies);
+        }
+        add_gathers(sets, groups.size(), {paths, kMostPointGathers, options.gather, !layout.knots.empty()}, bodies,
+                    stats);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
             openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
