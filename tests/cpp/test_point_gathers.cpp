@@ -53,7 +53,7 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
     const PointSet places = poisson_points(ball.scene.meshes[0], 0.1, {7});
     CoreSums blended(at_points->columns());
     for (std::size_t i = 0; i < places.size(); ++i) {
-        REQUIRE(at_points->append(places.positions[i], places.normals[i], false, blended));
+        REQUIRE(at_points->append(places.positions[i], places.normals[i], blended));
     }
     GatherOptions options;
     options.ramp_layers = true;
@@ -81,10 +81,10 @@ TEST_CASE("point gathers: no rows off the surface or on its other side") {
     const auto at_points = PointGathers::make(*ball.bodies[0], ball.placed.cloud(), 1, plan);
     REQUIRE(at_points);
     CoreSums rows(at_points->columns());
-    CHECK_FALSE(at_points->append(V3f(0.5f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), false, rows));
-    CHECK_FALSE(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(-1.0f, 0.0f, 0.0f), false, rows));
+    CHECK_FALSE(at_points->append(V3f(0.5f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows));
+    CHECK_FALSE(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(-1.0f, 0.0f, 0.0f), rows));
     CHECK(rows.size() == 0);
-    CHECK(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), false, rows));
+    CHECK(at_points->append(V3f(1.0f, 0.0f, 0.0f), V3f(1.0f, 0.0f, 0.0f), rows));
     CHECK(rows.size() == 1);
 }
 

@@ -25,8 +25,8 @@ class PointBlend {
     // The points' indices as `visit` numbers them.
     std::vector<std::uint32_t> order() const { return lookup_.order(); }
 
-    // visit(k, weight) for each point around a place with this outward normal; returns the sum of weights, 0 where there is
-    // none.
+    // visit(k, weight) for each point around a place with this outward normal; returns the sum of weights, 0
+    // where there is none.
     template <class Visit>
     float visit(const V3f& position, const V3f& normal, const Visit& visit) const {
         float sum = 0.0f;

@@ -9,14 +9,16 @@
 namespace frazil {
 namespace {
 
-// A gather serves places of a pixel that lie in one cell of so many spacings of the points, or mean free paths if these are
-// shorter: exitance is linear over it within one or two thousandths.
-constexpr float kCell = 0.5f;
-
-// Of normals of places that share a blend.
-constexpr float kLeastCosine = 0.9f;
+// A gather serves places of a pixel that lie in one cell of so many spacings of the points, but of so many mean free paths at
+// least and at most: exitance is linear over it within one or two thousandths.
+constexpr float kCell = 0.5f, kLeastCell = 0.25f, kLargestCell = 0.5f;
 
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
+
+float cell_of(const Body& body) {
+    const float free_path = body.mean_free_path();
+    return std::clamp(kCell * body.spacing, kLeastCell * free_path, kLargestCell * free_path);
+}
 
 // What the requests of one body are answered with, and which row each takes.
 struct Answers {
@@ -64,11 +66,6 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
     return places;
 }
 
-bool is_close(const GatherRequest& a, const GatherRequest& b, float distance) {
-    return a.pixel == b.pixel && (a.position - b.position).length2() < distance * distance &&
-           a.normal.dot(b.normal) > kLeastCosine;
-}
-
 // Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and those
 // of a lattice inside.
 Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options) {
@@ -79,28 +76,17 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
         columns.overlays = body.trees.overlays ? body.overlay_layers.size() * columns.groups : 0;
     }
     CoreSums blended(columns);
-    std::uint32_t last_seen = kNoRow;  // of the requests that the camera itself makes
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
         const GatherRequest& request = requests[i];
-        if (request.is_primary && !body.at_points->serves_camera()) continue;
-        // What one pixel shows lies close together.
-        if (request.is_primary && last_seen < i && is_close(requests[last_seen], request, kCell * body.spacing)) {
-            row_of[i] = row_of[last_seen];
-            is_blended.push_back(i);
-            continue;
-        }
+        if (request.is_primary) continue;
         const V3f position = request.position * body.to_points;
         V3f normal;
         body.to_points.multDirMatrix(request.normal, normal);
-        if (!body.at_points->append(position, normal, request.is_primary, blended)) {
-            if (request.is_primary) continue;
-            body.inside->append(position, blended);
-        }
+        if (!body.at_points->append(position, normal, blended)) body.inside->append(position, blended);
         row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
         is_blended.push_back(i);
-        if (request.is_primary) last_seen = i;
     }
-    const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
+    const Places places = shared_places(requests, cell_of(body), row_of);
     CoreSums sums =
         gather_core(body.trees, moved(places.below, body.to_points), moved(places.on_surface, body.to_points), options);
     sums.append(blended);

@@ -6,8 +6,6 @@ namespace frazil {
 namespace {
 
 constexpr float kReach = 1.5f;  // of the kernel, in spacings
-// Points nearer to each other than so many mean free paths serve the camera too.
-constexpr float kDense = 0.25f;
 
 // Of a row of sums, and of the point's place in the lookup.
 std::size_t bytes_per_point(const SumColumns& columns) {
@@ -28,16 +26,14 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     if (plan.paths < double(points.size()) || !PointBlend::suits(points)) return nullptr;
     const GatherOptions options = plan.options_for(body);
     CoreTrees trees = body.trees;
-    const bool serves_camera = body.spacing <= kDense * body.mean_free_path();
-    if (!serves_camera) trees.overlays = nullptr;
-    SumColumns columns = columns_of(trees, groups, options.ramp_layers ? body.material->ramp.distances.size() : 0);
-    if (trees.overlays) columns.overlays = body.overlay_layers.size() * groups;
+    trees.overlays = nullptr;
+    const SumColumns columns =
+        columns_of(trees, groups, options.ramp_layers ? body.material->ramp.distances.size() : 0);
     const std::size_t bytes = points.size() * bytes_per_point(columns);
     if (bytes > plan.bytes) return nullptr;
     plan.bytes -= bytes;
     plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(PointBlend(points, kReach), columns));
-    result->serves_camera_ = serves_camera;
     const std::vector<V3f> inwards = cloud.inward_positions();
     std::vector<V3f> below, on_surface;
     for (const std::uint32_t i : result->blend_.order()) {
@@ -48,9 +44,9 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     return result;
 }
 
-bool PointGathers::append(const V3f& position, const V3f& normal, bool with_overlays, CoreSums& rows) const {
+bool PointGathers::append(const V3f& position, const V3f& normal, CoreSums& rows) const {
     if (normal == V3f(0.0f)) return false;
-    const std::size_t count = with_overlays ? columns().count() : columns().first_overlay();
+    const std::size_t count = columns().count();
     Rgb* row = nullptr;
     const float sum = blend_.visit(position, normal, [&](std::uint32_t point, float weight) {
         if (!row) row = rows.add_row();

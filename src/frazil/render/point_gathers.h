@@ -4,7 +4,7 @@
 //   and a half spacings, comes within a few thousandths of a gather right there.
 // Units: as CoreSums; metres.
 // Valid: thread-safe after construction.
-// Not: what the camera sees itself, unless points are dense: it is gathered where it is seen.
+// Not: what the camera sees itself, which is gathered where it is seen.
 #pragma once
 
 #include <memory>
@@ -35,20 +35,17 @@ class PointGathers {
     static std::shared_ptr<const PointGathers> make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                     PointGatherPlan& plan);
 
-    // Whether points are so near to each other, in mean free paths, that a blend of them is as near to a gather as its
-    // tolerance: then it serves the camera too, with overlays.
-    bool serves_camera() const { return serves_camera_; }
+    // Without overlays, which only the camera asks for.
     const SumColumns& columns() const { return at_points_.columns(); }
 
     // Append the row of a place on the surface with this outward normal; false where no point is near. `rows` begin with these
-    // columns; overlays, if there are any, are left out where they are not asked for.
-    bool append(const V3f& position, const V3f& normal, bool with_overlays, CoreSums& rows) const;
+    // columns.
+    bool append(const V3f& position, const V3f& normal, CoreSums& rows) const;
 
   private:
     PointGathers(PointBlend blend, const SumColumns& columns) : blend_(std::move(blend)), at_points_(columns) {}
 
     PointBlend blend_;
-    bool serves_camera_ = false;
     CoreSums at_points_;  // in the order of the blend
 };
 
