@@ -29,7 +29,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
     std::vector<double> exitance(row);
     for (std::size_t lane = 0; lane < block.lanes; ++lane) {
         std::fill(exitance.begin(), exitance.end(), 0.0);
-        double coverage[3] = {0.0, 0.0, 0.0}, unshaded[3] = {0.0, 0.0, 0.0};
+        double coverage[3] = {0.0, 0.0, 0.0};
         for (std::size_t s = 0; s < list.sources.size(); ++s) {
             const Source& source = list.sources[s];
             const auto& cov = source.covariance;
@@ -49,7 +49,6 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                 // The kernel with its ramp, and its derivative in q.
                 float lit = even, lit_slope = f.slope;
                 if (!ramp.is_flat) {
-                    unshaded[c] += double(even) * source.power[c];
                     // Average each hinge over a uniform spread of distances.
                     float color = ramp.first[c], slope = 0.0f;
                     for (const auto& hinge : ramp.hinges) {
@@ -69,10 +68,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
                 }
             }
         }
-        for (int c = 0; c < 3; ++c) {
-            block.coverage[c][lane] += static_cast<float>(coverage[c]);
-            block.unshaded[c][lane] += static_cast<float>(unshaded[c]);
-        }
+        for (int c = 0; c < 3; ++c) block.coverage[c][lane] += static_cast<float>(coverage[c]);
         for (std::size_t c = 0; c < row; ++c) {
             block.exitance[c * kBlockLanes + lane] += static_cast<float>(exitance[c]);
         }

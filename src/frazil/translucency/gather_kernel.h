@@ -25,7 +25,6 @@ struct Source {
     std::array<float, 6> covariance;  // xx, yy, zz, and twice xy, xz, yz
     float trace;                      // of the covariance
     float area;
-    std::array<float, 3> power;  // of all groups together, in magnitude; needed with a ramp alone
 };
 
 // One light group's power of a source.
@@ -67,13 +66,10 @@ struct BlockSums {
     alignas(64) std::array<float, kBlockLanes> x{}, y{}, z{};
     std::size_t lanes = 0;  // in use; the rest is padding, which must hold finite positions
     alignas(64) std::array<std::array<float, kBlockLanes>, 3> coverage{};
-    alignas(64) std::array<std::array<float, kBlockLanes>,
-                           3> unshaded{};  // with a ramp: by the power of all groups, without it
     std::vector<float> exitance;
 
     void clear(std::size_t groups) {
         for (auto& row : coverage) row.fill(0.0f);
-        for (auto& row : unshaded) row.fill(0.0f);
         exitance.assign(3 * groups * kBlockLanes, 0.0f);
     }
     // Take shading points, at most kBlockLanes.
@@ -88,7 +84,7 @@ struct BlockSums {
     }
 };
 
-// The sums of shading points, one row each: exitance (groups, 3), coverage (3), unshaded (3), and zeros up to the stride.
+// The sums of shading points, one row each: exitance (groups, 3), coverage (3), and zeros up to the stride.
 class SumRows {
   public:
     static constexpr std::size_t kStep = 16;  // strides are multiples of it
@@ -99,23 +95,19 @@ class SumRows {
         values_.assign(count * stride(), 0.0f);
     }
     std::size_t size() const { return count_; }
-    std::size_t used() const { return row_ + 6; }
+    std::size_t used() const { return row_ + 3; }
     std::size_t stride() const { return (used() + kStep - 1) / kStep * kStep; }
     float* data() { return values_.data(); }
     const float* data() const { return values_.data(); }
     const float* exitance(std::size_t i) const { return &values_[i * stride()]; }
     const float* coverage(std::size_t i) const { return exitance(i) + row_; }
-    const float* unshaded(std::size_t i) const { return coverage(i) + 3; }
 
     // The lanes' sums join the rows from `first`.
     void add(std::size_t first, const BlockSums& lanes) {
         for (std::size_t lane = 0; lane < lanes.lanes; ++lane) {
             float* to = &values_[(first + lane) * stride()];
             for (std::size_t k = 0; k < row_; ++k) to[k] += lanes.exitance[k * kBlockLanes + lane];
-            for (std::size_t c = 0; c < 3; ++c) {
-                to[row_ + c] += lanes.coverage[c][lane];
-                to[row_ + 3 + c] += lanes.unshaded[c][lane];
-            }
+            for (std::size_t c = 0; c < 3; ++c) to[row_ + c] += lanes.coverage[c][lane];
         }
     }
 

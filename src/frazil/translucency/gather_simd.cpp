@@ -99,7 +99,6 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
         for (std::size_t tile = 0; tile < count; tile += kTile) {
             const std::size_t tile_size = HWY_MIN(kTile, count - tile);
             FloatV coverage0 = hn::Zero(d), coverage1 = hn::Zero(d), coverage2 = hn::Zero(d);
-            FloatV unshaded0 = hn::Zero(d), unshaded1 = hn::Zero(d), unshaded2 = hn::Zero(d);
             for (std::size_t i = 0; i < tile_size; ++i) {
                 // Squared distance, and the source's moments along it.
                 const Source& source = list.sources[tile + i];
@@ -161,8 +160,6 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                     // The kernel with its ramp, and its derivative in q.
                     FloatV lit = even, lit_slope = hn::Mul(slope, slope_scale);
                     if constexpr (kHasRamp) {
-                        FloatV& unshaded = channel == 0 ? unshaded0 : channel == 1 ? unshaded1 : unshaded2;
-                        unshaded = hn::MulAdd(even, hn::Set(d, source.power[channel]), unshaded);
                         FloatV color, color_slope;
                         shade(ramp, channel, mean_r, half_width, inverse_width, color, color_slope);
                         lit = hn::MulAdd(even, color, hn::Mul(hn::Mul(slope, spread), color_slope));
@@ -180,15 +177,6 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
             hn::Store(hn::Add(hn::Load(d, covered), coverage1), d, covered);
             covered += kBlockLanes;
             hn::Store(hn::Add(hn::Load(d, covered), coverage2), d, covered);
-
-            if constexpr (kHasRamp) {
-                float* whole = block.unshaded[0].data() + first;
-                hn::Store(hn::Add(hn::Load(d, whole), unshaded0), d, whole);
-                whole += kBlockLanes;
-                hn::Store(hn::Add(hn::Load(d, whole), unshaded1), d, whole);
-                whole += kBlockLanes;
-                hn::Store(hn::Add(hn::Load(d, whole), unshaded2), d, whole);
-            }
 
             // Every group's three channels from the same kernels.
             const GroupPower* const* powers = list.powers.data() + tile;

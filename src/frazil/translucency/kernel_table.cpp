@@ -8,6 +8,8 @@ namespace frazil {
 namespace {
 
 constexpr int kN = KernelTable::kCoefficients;
+// Of the albedo: r² Rd where the table may end.
+constexpr double kLeastShare = 1e-8;
 
 // The power-basis polynomial in t - 1/2 for t in [0, 1] that comes nearest to f: weighted least squares over Chebyshev
 // nodes, which is nearly the least greatest error of weight times f.
@@ -41,13 +43,13 @@ std::array<double, kN> fit(const Function& f, const Weight& weight) {
     return power;
 }
 
-// The distance beyond which r² Rd is less than 1e-7 of the albedo in every channel, at most 2^15 z0.
+// The distance beyond which r² Rd is less than kLeastShare of the albedo in every channel, at most 2^15 z0.
 double reach_of(const Profile& profile, double z0) {
     double reach = z0;
     for (; reach < 32768.0 * z0; reach *= 1.1) {
         bool is_dark = true;
         for (int c = 0; c < 3; ++c) {
-            is_dark = is_dark && reach * reach * reflectance(profile, c, reach) <= 1e-7 * albedo(profile, c);
+            is_dark = is_dark && reach * reach * reflectance(profile, c, reach) <= kLeastShare * albedo(profile, c);
         }
         if (is_dark) break;
     }
@@ -70,11 +72,14 @@ KernelTable tabulate(const Profile& profile) {
         const double octave = std::ldexp(1.0, s / pieces);
         const double begin = octave * (1.0 + double(s % pieces) / pieces), width = octave / pieces;
         for (int c = 0; c < 3; ++c) {
-            const auto power = fit(
-                [&](double t) {
-                    return reflectance(profile, c, z0 * std::sqrt(std::max(0.0, begin + t * width - 1.0)));
-                },
-                [&](double t) { return std::sqrt(begin + t * width - 0.97); });  // towards r²: a ring's share of energy
+            const auto f = [&](double t) {
+                return reflectance(profile, c, z0 * std::sqrt(std::max(0.0, begin + t * width - 1.0)));
+            };
+            // Relative errors, down to what a ring as faint as `least` has.
+            const auto power = fit(f, [&](double t) {
+                const double least = kLeastShare * albedo(profile, c) / (z0 * z0 * (begin + t * width - 0.97));
+                return 1.0 / (f(t) + least + 1e-300);
+            });
             for (int k = 0; k < kN; ++k) table.coefficient[c][k][s] = static_cast<float>(power[k]);
         }
     }

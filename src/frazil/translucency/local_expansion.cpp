@@ -108,31 +108,31 @@ void LocalExpansion::place(const Box3f& box, BlockSums& nodes) {
     const V3f half = box.size() * 0.5f;
     middle_ = box.center();
     for (int i = 0; i < 3; ++i) per_half_[i] = half[i] > 1e-6f * half.length() ? 1.0f / half[i] : 0.0f;
-    nodes.lanes = kNodes;
     for (std::size_t j = 0; j < kNodes; ++j) {
-        nodes.x[j] = middle_.x + half.x * places[j].x;
-        nodes.y[j] = middle_.y + half.y * places[j].y;
-        nodes.z[j] = middle_.z + half.z * places[j].z;
+        nodes_[j] = middle_ + half * places[j];
     }
+    nodes.place(nodes_.data(), kNodes);
 }
 
-void LocalExpansion::fit(const BlockSums& nodes, std::size_t groups) {
+void LocalExpansion::fit(const BlockSums& nodes, std::size_t groups, const LocalExpansion* above) {
     static const std::vector<float> fit = make_fit();
     values_.reset(kNodes, groups);
+    if (above) above->eval(nodes_, values_);
     values_.add(0, nodes);
     coefficients_.reset(kTerms, groups);
     HWY_DYNAMIC_DISPATCH(fit_here)(fit.data(), values_, coefficients_);
 }
 
-void LocalExpansion::eval(const std::vector<V3f>& positions, SumRows& sums) {
-    terms_.resize(positions.size() * kTerms);
+void LocalExpansion::eval(std::span<const V3f> positions, SumRows& sums) const {
+    thread_local std::vector<float> terms;
+    terms.resize(positions.size() * kTerms);
     for (std::size_t i = 0; i < positions.size(); ++i) {
         V3f p = (positions[i] - middle_) * per_half_;
         for (int axis = 0; axis < 3; ++axis)
             p[axis] = std::clamp(p[axis], -1.0f, 1.0f);  // far from the origin, rounding
-        terms_of(p.x, p.y, p.z, &terms_[i * kTerms]);
+        terms_of(p.x, p.y, p.z, &terms[i * kTerms]);
     }
-    HWY_DYNAMIC_DISPATCH(eval_here)(terms_.data(), coefficients_, sums);
+    HWY_DYNAMIC_DISPATCH(eval_here)(terms.data(), coefficients_, sums);
 }
 
 }  // namespace frazil

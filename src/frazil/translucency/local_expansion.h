@@ -7,7 +7,9 @@
 // Not: how large the box may be: gather.cpp.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "frazil/base/vec.h"
@@ -21,15 +23,15 @@ class LocalExpansion {
 
     // Put the nodes into a box that holds the shading points; they become the block's lanes.
     void place(const Box3f& box, BlockSums& nodes);
-    // Take the nodes' sums.
-    void fit(const BlockSums& nodes, std::size_t groups);
+    // Take the nodes' sums, and to them add those of an expansion `above`, of a box that holds this one, or null.
+    void fit(const BlockSums& nodes, std::size_t groups, const LocalExpansion* above = nullptr);
     // The sums at places, as many as `sums` has rows.
-    void eval(const std::vector<V3f>& positions, SumRows& sums);
+    void eval(std::span<const V3f> positions, SumRows& sums) const;
 
   private:
     V3f middle_{0.0f}, per_half_{0.0f};  // 1 over half the box's sides
-    SumRows values_, coefficients_;      // kNodes, kTerms
-    std::vector<float> terms_;
+    std::array<V3f, kNodes> nodes_;
+    SumRows values_, coefficients_;  // kNodes, kTerms
 };
 
 }  // namespace frazil

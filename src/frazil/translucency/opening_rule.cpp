@@ -15,8 +15,7 @@ constexpr double kWidest = 0.6;
 
 }  // namespace
 
-OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance,
-                         double darkness)
+OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance)
     : inverse_z0_squared_(table.inverse_z0_squared) {
     const double z0 = 1.0 / std::sqrt(double(inverse_z0_squared_)), shortest = shortest_mean_free_path(profile);
     for (int i = 0; i < kEntries; ++i) {
@@ -29,7 +28,7 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool 
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
             const double length = std::min(mean_free_path(profile, c), kLengthPerBend * bend_length(profile, c));
             const double bend = 1.5 / std::hypot(r, length) + decay;
-            const double share = std::min(1.0, 6.0 * (r * r + shortest * shortest) * f / (total * darkness));
+            const double share = std::min(1.0, 6.0 * (r * r + shortest * shortest) * f / total);
             const double cubed =
                 std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
             limit = std::min(limit, std::cbrt(cubed / std::pow(std::max(share, 1e-12), kSharePower)) / bend);

@@ -16,10 +16,7 @@ namespace frazil {
 
 class OpeningRule {
   public:
-    // `darkness` is how much less light arrives than the coverage promises: where all of it comes from afar, what is
-    // far matters more.
-    OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance,
-                double darkness = 1.0);
+    OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance);
 
     // The largest squared radius of a cluster at squared distance q.
     float largest_squared(float q) const {

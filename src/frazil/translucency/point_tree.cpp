@@ -134,13 +134,11 @@ TreeKernel::TreeKernel(const Profile& of_profile, const Ramp& with_ramp)
     }
 }
 
-const std::vector<OpeningRule>& TreeKernel::rules(float tolerance) const {
+const OpeningRule& TreeKernel::rule(float tolerance) const {
     const std::lock_guard lock(mutex_);
-    std::vector<OpeningRule>& made = rules_[tolerance];
-    for (std::size_t level = made.size(); level < kDarkness.size(); ++level) {
-        made.emplace_back(profile, table, !ramp.is_empty(), tolerance, kDarkness[level]);
-    }
-    return made;
+    const auto found = rules_.find(tolerance);
+    if (found != rules_.end()) return found->second;
+    return rules_.emplace(tolerance, OpeningRule(profile, table, !ramp.is_empty(), tolerance)).first->second;
 }
 
 std::shared_ptr<const TreeKernel> make_tree_kernel(const Profile& profile, const Ramp& ramp) {

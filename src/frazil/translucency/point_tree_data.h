@@ -28,10 +28,6 @@ inline float lean_reach(float cell_trace) {
     return 2.0f * std::sqrt(cell_trace);
 }
 
-// Irradiance that arrives, against what the coverage would bring of the mean irradiance: steps of it, each with a stricter
-// rule.
-inline constexpr std::array<double, 4> kDarkness = {1.0, 0.1, 0.01, 0.001};
-
 // ValueError where one of them is not finite.
 void check_positions(const V3f* positions, std::size_t count);
 
@@ -44,12 +40,12 @@ struct TreeKernel {
 
     TreeKernel(const Profile& profile, const Ramp& ramp);
 
-    // One for each darkness; made when a tolerance is first asked for, by any thread. They stay where they are.
-    const std::vector<OpeningRule>& rules(float tolerance) const;
+    // Made when a tolerance is first asked for, by any thread. It stays where it is.
+    const OpeningRule& rule(float tolerance) const;
 
   private:
     mutable std::mutex mutex_;
-    mutable std::map<float, std::vector<OpeningRule>> rules_;  // by tolerance
+    mutable std::map<float, OpeningRule> rules_;  // by tolerance
 };
 
 struct PointTree::Impl {
