@@ -21,7 +21,6 @@ double greatest_error(const Box3f& box, const Function& f) {
         const V3f p(nodes.x[j], nodes.y[j], nodes.z[j]);
         for (std::size_t k = 0; k < 3 * kGroups; ++k) nodes.exitance[k * kBlockLanes + j] = f(k, p);
         for (std::size_t c = 0; c < 3; ++c) nodes.coverage[c][j] = f(3 * kGroups + c, p);
-        for (std::size_t c = 0; c < 3; ++c) nodes.unshaded[c][j] = f(3 * kGroups + 3 + c, p);
     }
     expansion.fit(nodes, kGroups);
     std::vector<V3f> places;
@@ -34,7 +33,7 @@ double greatest_error(const Box3f& box, const Function& f) {
     expansion.eval(places, sums);
     double error = 0.0;
     for (std::size_t i = 0; i < places.size(); ++i) {
-        for (std::size_t k = 0; k < 3 * kGroups + 6; ++k) {
+        for (std::size_t k = 0; k < 3 * kGroups + 3; ++k) {
             error = std::max(error, std::abs(double(sums.exitance(i)[k]) - f(k, places[i])));
         }
     }

@@ -29,12 +29,22 @@ void BlockSources::add_cluster(std::uint32_t index) {
     list_.powers.push_back(&tree_.node_powers[index * tree_.groups]);
 }
 
+// A point without extent.
+void BlockSources::add_point(std::uint32_t p) {
+    const V3f& center = clusters().positions[p];
+    const float area = clusters().areas[p];
+    list_.sources.push_back({{center.x, center.y, center.z}, {}, 0.0f, area});
+    GroupPower* to = list_.add_own(tree_.groups);
+    for (std::size_t g = 0; g < tree_.groups; ++g) {
+        to[g] = group_power(tree_.irradiance[p * tree_.groups + g], area, V3f(0.0f));
+    }
+}
+
 // A part of a point's cell about `center`: `share` of its area. Its powers are for the caller to add.
 void BlockSources::add_part(const PointCell& cell, const V3f& center, float area, float share, float largest_squared) {
     const float squared = 2.0f * cell.trace * share;
     // Of a part that stays too large for its second moments, those of the largest that they hold for.
-    float v = has_footprints_ ? share : 0.0f;
-    if (squared > largest_squared && has_footprints_) v *= largest_squared / squared;
+    const float v = squared > largest_squared ? share * largest_squared / squared : share;
     const auto& c = cell.covariance;
     list_.sources.push_back({{center.x, center.y, center.z},
                              {v * c[0], v * c[1], v * c[2], 2.0f * v * c[3], 2.0f * v * c[4], 2.0f * v * c[5]},
@@ -48,7 +58,7 @@ void BlockSources::add_whole(std::uint32_t p, const PointCell& cell, float large
     add_part(cell, clusters().positions[p], area, 1.0f, largest_squared);
     GroupPower* to = list_.add_own(tree_.groups);
     for (std::size_t g = 0; g < tree_.groups; ++g) {
-        const V3f offset = has_footprints_ ? tree_.power_offset(p, g, lean_reach(cell.trace)) : V3f(0.0f);
+        const V3f offset = tree_.power_offset(p, g, lean_reach(cell.trace));
         to[g] = group_power(tree_.irradiance[p * tree_.groups + g], area, offset);
     }
 }
@@ -81,11 +91,11 @@ void BlockSources::add_split(std::uint32_t p, const PointCell& cell, const CellF
 
 void BlockSources::add_points(const TreeNode& leaf, const Box3f& box) {
     for (std::uint32_t p = leaf.first; p < leaf.first + leaf.size(); ++p) {
-        const PointCell cell(clusters(), p);
         if (!has_footprints_) {
-            add_whole(p, cell, 0.0f);
+            add_point(p);
             continue;
         }
+        const PointCell cell(clusters(), p);
         // From the cell's rim: what stands on a cell is nearest to its middle parts.
         const float squared = 2.0f * cell.trace;
         const float distance =

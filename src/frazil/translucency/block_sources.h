@@ -5,7 +5,7 @@
 // Not: which nodes stand for their points: gather.cpp.
 #pragma once
 
-#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "frazil/translucency/gather_kernel.h"
@@ -14,11 +14,16 @@
 
 namespace frazil {
 
+// From a box to a place, without branches.
 inline float squared_distance(const Box3f& box, const V3f& p) {
-    const float x = std::max(0.0f, std::max(box.min.x - p.x, p.x - box.max.x));
-    const float y = std::max(0.0f, std::max(box.min.y - p.y, p.y - box.max.y));
-    const float z = std::max(0.0f, std::max(box.min.z - p.z, p.z - box.max.z));
-    return x * x + y * y + z * z;
+    const V3f middle = (box.min + box.max) * 0.5f, half = (box.max - box.min) * 0.5f;
+    float sum = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        const float d = std::abs(p[i] - middle[i]) - half[i];
+        const float outside = 0.5f * (d + std::abs(d));
+        sum += outside * outside;
+    }
+    return sum;
 }
 
 class BlockSources {
@@ -39,6 +44,7 @@ class BlockSources {
 
   private:
     const PointClusters& clusters() const { return *tree_.clusters; }
+    void add_point(std::uint32_t p);
     void add_part(const PointCell& cell, const V3f& center, float area, float share, float largest_squared);
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared);
     void add_split(std::uint32_t p, const PointCell& cell, const CellFrame& frame, const V2f& z, float share,

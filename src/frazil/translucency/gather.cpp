@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kChunk = 2048, kLargestChunk = 8192, kChunks = 64;
 constexpr std::size_t kLeafPlaces = 48;  // no smaller blocks are made
 // Half a block's diagonal that a source is smooth across, over the radius of a cluster that may stand for it, squared.
-constexpr float kSmooth = 1.0f;
+constexpr float kSmooth = 2.0f;
 constexpr std::size_t kCacheLine = 64;
 
 // The shading points that the tree reaches, along a Morton curve; to the rest belongs exactly nothing.

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kN = KernelTable::kCoefficients;
 // Of the albedo: r² Rd where the table may end.
-constexpr double kLeastShare = 1e-8;
+constexpr double kLeastShare = 1e-7;
 
 // The power-basis polynomial in t - 1/2 for t in [0, 1] that comes nearest to f: weighted least squares over Chebyshev
 // nodes, which is nearly the least greatest error of weight times f.
@@ -75,10 +75,11 @@ KernelTable tabulate(const Profile& profile) {
             const auto f = [&](double t) {
                 return reflectance(profile, c, z0 * std::sqrt(std::max(0.0, begin + t * width - 1.0)));
             };
-            // Relative errors, down to what a ring as faint as `least` has.
+            // Relative errors, down to what a ring as faint as kLeastShare has; less so about r = 0, where rings are small.
             const auto power = fit(f, [&](double t) {
-                const double least = kLeastShare * albedo(profile, c) / (z0 * z0 * (begin + t * width - 0.97));
-                return 1.0 / (f(t) + least + 1e-300);
+                const double squared = begin + t * width - 0.97,
+                             least = kLeastShare * albedo(profile, c) / (z0 * z0 * squared);
+                return std::sqrt(squared) / (f(t) + least + 1e-300);
             });
             for (int k = 0; k < kN; ++k) table.coefficient[c][k][s] = static_cast<float>(power[k]);
         }

@@ -3,7 +3,7 @@
 //   polynomials through Chebyshev nodes in each. Slopes and curvatures in q come from the same polynomials.
 // Units: q in m², values in 1/m².
 // Valid: error times 2 pi r², a ring's share of energy, <= 1e-4 of the albedo (test_translucency.cpp); beyond `reach`,
-//   where r² Rd falls under 1e-7 of the albedo, exactly zero.
+//   where r² Rd falls under 1e-7 of the albedo, exactly zero. Fitted for relative errors down to that.
 // Not: ramps, whose kinks no polynomial takes: they multiply afterwards, exactly.
 #pragma once
 

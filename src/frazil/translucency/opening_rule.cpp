@@ -5,9 +5,11 @@
 namespace frazil {
 namespace {
 
-// Calibrated on a bunny and a sphere (bench/gather.py): how a tolerance becomes a size, and by how much the size may
-// grow where little of the profile's energy is left.
-constexpr double kSizePerTolerance = 850.0, kSharePower = 0.2, kLargestCubed = 7.5, kRampCaution = 0.4;
+// Calibrated on ten bodies (bench/gather.py): how a tolerance becomes a size, and its largest.
+constexpr double kSizePerTolerance = 1000.0, kLargestCubed = 7.5, kRampCaution = 0.4;
+// What a distance's ring has of the albedo, below which errors need not be relative to it: clusters grow, so many times at
+// most. Light that is this dark among its group's own is as exact as the rest.
+constexpr double kFaintShare = 1e-6, kFaintest = 10.0;
 // How far from r = 0 a profile is as steep as it ever is, over the length of its bend; at most a mean free path.
 constexpr double kLengthPerBend = 1.5;
 // A cluster is never seen from nearer than its radius over this.
@@ -28,10 +30,10 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool 
             const double decay = std::log(f / std::max(1e-300, reflectance(profile, c, r + step))) / step;
             const double length = std::min(mean_free_path(profile, c), kLengthPerBend * bend_length(profile, c));
             const double bend = 1.5 / std::hypot(r, length) + decay;
-            const double share = std::min(1.0, 6.0 * (r * r + shortest * shortest) * f / total);
+            const double share = 6.0 * (r * r + shortest * shortest) * f / total;
             const double cubed =
                 std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
-            limit = std::min(limit, std::cbrt(cubed / std::pow(std::max(share, 1e-12), kSharePower)) / bend);
+            limit = std::min(limit, std::cbrt(cubed * std::clamp(kFaintShare / share, 1.0, kFaintest)) / bend);
         }
         largest_[i] = static_cast<float>(limit * limit);
     }
