@@ -351,7 +351,7 @@ def test_bad_coverage(coverage):
 
 
 def test_bad_boundaries():
-    for eta in (0.0, -1.0, np.nan, np.inf):
+    for eta in (0.0, -1.0, np.nan, np.inf, 1e300, 1e-300):
         with pytest.raises(ValueError, match="fresnel_average: eta must be > 0 and finite"):
             fz.fresnel_average(eta)
         with pytest.raises(ValueError, match="fresnel_dielectric: eta must be > 0 and finite"):
@@ -394,6 +394,7 @@ def test_hostile_positions(estimator):
         ([0.1, 0.1], [[1, 1, 1], [1, 1, 1]], "distances must increase"),
         ([-1], [[1, 1, 1]], "distances must be >= 0"),
         ([0.0], [[1, -1, 1]], "colors must be >= 0"),
+        ([0.0], [[1, 3e38, 1]], r"colors must be at most 1e\+06, got 3e\+38 at knot 0"),
         ([0.0, 1.0], [[1, 1, 1]], "one row per distance"),
         ([], np.zeros((0, 3)), "at least one knot"),
     ],
@@ -419,6 +420,17 @@ def test_coarse_points_keep_the_coverage_right_on_average_and_never_negative(spa
     np.testing.assert_allclose(together.mean(axis=0), 1, atol=0.05)
     np.testing.assert_allclose(alone.mean(axis=0), together[:300].mean(axis=0), atol=0.03)
     assert alone.min() >= 0
+
+
+def test_the_brightest_ramps_stay_finite():
+    """Colours near the largest number overflowed to NaN."""
+    points, ramp = sphere(200), fz.Ramp([0.0, 1e-9, 0.01], [[1e6, 0, 1e6], [0, 1e6, 1e-6], [1e6, 1e6, 0]])
+    for kind in (fz.Dipole, fz.MultipleScattering):
+        tree = fz.PointTree(points, np.ones((200, 3)), kind(MEDIUM), ramp)
+        for estimator in ESTIMATORS:
+            out = tree.gather(points.positions, estimator=estimator)
+            assert np.isfinite(out.exitance).all()
+            assert out.exitance.max() > 1e4
 
 
 def test_coefficients_beyond_those_of_matter():

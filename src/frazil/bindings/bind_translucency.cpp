@@ -157,8 +157,9 @@ nb::class_<Kind> bind_profile(nb::module_& module, const char* name, const char*
 }
 
 void check_index(const char* function, double eta) {
-    if (eta > 0.0 && std::isfinite(eta)) return;
-    throw ValueError(str(function, ": eta must be > 0 and finite, got ", eta, ". From air into ice it is 1.31."));
+    if (eta >= 1e-6 && eta <= 1e6) return;
+    throw ValueError(str(function, ": eta must be > 0 and finite, and in [1e-06, 1e+06], got ", eta,
+                         ". From air into ice it is 1.31."));
 }
 
 Profile to_profile(nb::handle object) {

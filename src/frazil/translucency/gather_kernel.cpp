@@ -42,7 +42,7 @@ void add_sources_scalar(const KernelTable& table, const RampHinges& ramp, const 
             // Mean and variance of the distance over the source.
             const float variance = std::max(0.0f, along / (q + trace + 1e-30f));
             const float mean_r = std::sqrt(std::max(0.0f, q + trace - variance));
-            const float half_width = std::sqrt(3.0f * variance) + 1e-6f * mean_r + 1e-30f;
+            const float half_width = std::sqrt(3.0f * variance) + 1e-6f * mean_r + kLeastSpread;
             for (int c = 0; c < 3; ++c) {
                 const KernelTable::Jet f = table.eval(c, q);
                 const float even = f.value + f.slope * trace + 2.0f * f.curvature * along;

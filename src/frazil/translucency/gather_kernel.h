@@ -20,6 +20,9 @@ namespace frazil {
 
 inline constexpr std::size_t kBlockLanes = 64;  // shading points of a block, at most
 
+// Of distances over a source, in metres: its inverse times the steepest ramp stays in float's range.
+inline constexpr float kLeastSpread = 1e-12f;
+
 struct Source {
     std::array<float, 3> center;
     std::array<float, 6> covariance;  // xx, yy, zz, and twice xy, xz, yz

@@ -137,7 +137,7 @@ void add_sources_simd(const KernelTable& table, const RampHinges& ramp, const So
                     const FloatV tiny = hn::Set(d, 1e-30f);
                     const FloatV variance = hn::Max(hn::Zero(d), hn::Div(along, hn::Add(hn::Add(q, trace), tiny)));
                     mean_r = hn::Sqrt(hn::Max(hn::Zero(d), hn::Sub(hn::Add(q, trace), variance)));
-                    half_width = hn::Add(hn::MulAdd(mean_r, hn::Set(d, 1e-6f), tiny),
+                    half_width = hn::Add(hn::MulAdd(mean_r, hn::Set(d, 1e-6f), hn::Set(d, kLeastSpread)),
                                          hn::Sqrt(hn::Mul(variance, hn::Set(d, 3.0f))));
                     inverse_width = hn::Div(one, half_width);
                     half_per_r = hn::Div(hn::Set(d, 0.5f), hn::Add(mean_r, half_width));

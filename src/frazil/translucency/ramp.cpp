@@ -6,6 +6,11 @@
 #include "frazil/base/quadrature.h"
 
 namespace frazil {
+namespace {
+
+constexpr float kLargestColor = 1e6f;  // so that slopes between near knots stay in float's range
+
+}  // namespace
 
 void check_ramp(const Ramp& ramp, const std::string& path) {
     if (ramp.colors.size() != ramp.distances.size()) {
@@ -26,6 +31,10 @@ void check_ramp(const Ramp& ramp, const std::string& path) {
             if (!(ramp.colors[k][c] >= 0.0f && std::isfinite(ramp.colors[k][c]))) {
                 throw ValueError(str(path, ": colors must be >= 0 and finite, got ", ramp.colors[k][c], " at knot ", k,
                                      ". It is a factor of the light."));
+            }
+            if (ramp.colors[k][c] > kLargestColor) {
+                throw ValueError(str(path, ": colors must be at most ", kLargestColor, ", got ", ramp.colors[k][c],
+                                     " at knot ", k, ". It is a factor of the light; brighten the light instead."));
             }
         }
     }
