@@ -181,3 +181,22 @@ TEST_CASE("placed points: clusters and sums stand as far below the surface as th
     CHECK(made == 2);
     for (const V3f& p : cloud.clusters()->positions) CHECK(p.y == doctest::Approx(1.8));
 }
+
+TEST_CASE("placed points: what thin parts return is made once for a body, and forgotten where it is asked to") {
+    PointCloud cloud(poisson_points(sphere(0.3f, 2), 0.1));
+    int made = 0;
+    const auto gain_of = [&](float absorption) {
+        return cloud.thin_gain({1.0f, 1.0f, 1.0f, absorption}, [&] {
+            ++made;
+            return std::vector<Rgb>(cloud.points().size(), Rgb(absorption));
+        });
+    };
+    CHECK(gain_of(0.1f)->front() == Rgb(0.1f));
+    CHECK(gain_of(0.1f)->front() == Rgb(0.1f));
+    CHECK(made == 1);
+    CHECK(gain_of(0.2f)->front() == Rgb(0.2f));
+    CHECK(made == 2);
+    cloud.drop_thin_gain();
+    CHECK(gain_of(0.2f)->front() == Rgb(0.2f));
+    CHECK(made == 3);
+}

@@ -191,16 +191,18 @@ std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     const float seen_through = is_closed_body(leader) ? body.material->refraction : 0.0f;
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
-    const auto make = [&](PlacementMask mask) {
-        return make_tree(points, body.plain_kernel,
-                         thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced, seen_through,
-                                        sets_.shells(leader), mask),
-                         1);
+    const auto gain = [&](PlacementMask mask) {
+        return thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced, seen_through,
+                              sets_.shells(leader), mask);
     };
-    if (!is_shared(leader)) return make(nullptr);
+    if (!is_shared(leader)) return make_tree(points, body.plain_kernel, gain(nullptr), 1);
     auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
-    if (!shared) shared = make(&itself);
-    return shared;
+    if (shared) return shared;
+    const Rgb &scatter = body.medium.sigma_s_prime, &absorb = body.medium.sigma_a;
+    const auto known = points.cloud().thin_gain(
+        {scatter.x, scatter.y, scatter.z, absorb.x, absorb.y, absorb.z, body.medium.eta, body.traced, seen_through},
+        [&] { return gain(&itself); });
+    return shared = make_tree(points, body.plain_kernel, *known, 1);
 }
 
 std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::size_t leader,

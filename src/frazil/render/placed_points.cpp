@@ -62,6 +62,19 @@ void PointCloud::add_room(float sigma_t, float depth, const std::function<Room()
     clusters_ = nullptr;
 }
 
+std::shared_ptr<const std::vector<Rgb>> PointCloud::thin_gain(const ThinBody& of,
+                                                              const std::function<std::vector<Rgb>()>& make) {
+    const std::lock_guard lock(mutex_);
+    if (!thin_gain_ || thin_body_ != of) thin_gain_ = std::make_shared<const std::vector<Rgb>>(make());
+    thin_body_ = of;
+    return thin_gain_;
+}
+
+void PointCloud::drop_thin_gain() {
+    const std::lock_guard lock(mutex_);
+    thin_gain_ = nullptr;
+}
+
 std::vector<V3f> PointCloud::inward_positions() const {
     const std::lock_guard lock(mutex_);
     std::vector<V3f> positions = points_.positions;

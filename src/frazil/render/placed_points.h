@@ -5,9 +5,11 @@
 // Not: the light on the points, which every body has for itself (LitPoints).
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "frazil/points/cells.h"
 #include "frazil/points/point_lookup.h"
@@ -36,6 +38,13 @@ class PointCloud {
     std::vector<V3f> inward_positions() const;
     std::vector<float> room_along() const;
 
+    // What thin parts around its points return (thickness.h), for one body: made anew where the body it is `of` is another.
+    using ThinBody = std::array<float, 9>;
+    std::shared_ptr<const std::vector<Rgb>> thin_gain(const ThinBody& of,
+                                                      const std::function<std::vector<Rgb>()>& make);
+    // Of use from the bake until trees are planted, while bodies stay where they are.
+    void drop_thin_gain();
+
     // Made when first asked for, with the cells and the room that are there by then.
     std::shared_ptr<const PointClusters> clusters();
     // The same without that room: on the surface.
@@ -48,6 +57,8 @@ class PointCloud {
     std::shared_ptr<const Cells> cells_;
     Room room_;
     float sigma_t_ = 0.0f, depth_ = 0.0f;  // of the room
+    ThinBody thin_body_{};
+    std::shared_ptr<const std::vector<Rgb>> thin_gain_;
     std::shared_ptr<const PointClusters> clusters_, surface_clusters_;
     std::shared_ptr<const PointLookup> lookup_;
 };
