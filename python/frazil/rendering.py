@@ -109,7 +109,8 @@ def render(
         Shadow rays of the bake go on through ice, dimmed: for thin clear ice. Off, light that enters ice counts as
         diffused there.
     bake_bounces : int
-        Of light that reaches the points by way of ice and diffuse surfaces, 0 or more.
+        Of light that reaches the points by way of ice and diffuse surfaces, 0 or more. With 3 or more all
+        that is left after them is added as a geometric series.
     tolerance : float
         Relative error that clustering may make in a gather, > 0.
     estimator : str

@@ -75,3 +75,37 @@ TEST_CASE("a convex body alone sees no ice: bounces change no bit") {
     options.bake_bounces = 2;
     CHECK(render(scene, options).film.layers.at("beauty").pixels == without.layers.at("beauty").pixels);
 }
+
+TEST_CASE("light at the bottom of a well of white ice: what bounces are left after some is summed as one series") {
+    Scene scene = scene_of(box_of(V3f(-1.0f, -4.0f, -1.0f), V3f(1.0f, -3.0f, 1.0f)),
+                           ice(Rgb(1e-4f), 1.0f, 0.3f, CompensationMode::conserve));
+    const auto add_wall = [&](const V3f& low, const V3f& high) {
+        const auto mesh = static_cast<std::uint32_t>(scene.meshes.size());
+        scene.meshes.push_back(box_of(low, high));
+        scene.mesh_paths.push_back("/wall" + std::to_string(mesh));
+        scene.objects.push_back({scene.mesh_paths.back(), mesh, 0, M44f()});
+    };
+    add_wall(V3f(1.01f, -4.0f, -1.0f), V3f(2.0f, 0.0f, 1.0f));
+    add_wall(V3f(-2.0f, -4.0f, -1.0f), V3f(-1.01f, 0.0f, 1.0f));
+    add_wall(V3f(-2.0f, -4.0f, 1.01f), V3f(2.0f, 0.0f, 2.0f));
+    add_wall(V3f(-2.0f, -4.0f, -2.0f), V3f(2.0f, 0.0f, -1.01f));
+    scene.lights = {dome(Rgb(1.0f, 0.5f, 0.0f))};
+    RenderOptions options = small();
+    options.bake_samples = 256;
+    options.spacing = 0.12f;
+    const auto light = [&](int bounces) {
+        options.bake_bounces = bounces;
+        Rgb sum(0.0f);
+        for (const LitPoints& lit : bake(scene, options).bake.bodies) {
+            for (const Rgb& value : lit.irradiance) sum += value / float(lit.irradiance.size());
+        }
+        return sum;
+    };
+    const Rgb all = light(40);
+    CHECK(light(2).x < 0.65f * all.x);  // as they come
+    CHECK(light(4).x == doctest::Approx(all.x).epsilon(0.1));
+    CHECK(light(8).x == doctest::Approx(all.x).epsilon(0.03));
+    // Linear in every channel.
+    CHECK(all.y == doctest::Approx(0.5 * all.x).epsilon(1e-5));
+    CHECK(all.z == 0.0f);
+}

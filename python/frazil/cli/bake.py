@@ -50,7 +50,10 @@ def bake_command(
         bool, typer.Option("--translucent-shadows", help="Shadow rays of the bake go on through ice, dimmed.")
     ] = False,
     bake_bounces: Annotated[
-        int, typer.Option(metavar="N", help="Of light that reaches ice by way of ice and diffuse surfaces.")
+        int,
+        typer.Option(
+            metavar="N", help="Of light between ice, ice and diffuse surfaces; from 3 on with all that is left after."
+        ),
     ] = 4,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = RENDER_TOLERANCE,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",

@@ -14,6 +14,9 @@ namespace frazil {
 namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
+// Of so many bounces on the last two tell what all after them bring: no more than 19 times the last.
+constexpr int kFewestForTail = 3;
+constexpr double kLargestRatio = 0.95;
 
 // A point that sees a point of ice: the light of `sender` counts so much in that of `receiver`.
 struct Sightline {
@@ -113,6 +116,35 @@ void add_light(const Sightlines& sightlines, const std::vector<Exchange>& bodies
     });
 }
 
+// What all points receive together, per group; light that subtracts counts as much.
+void add_power(const Irradiance& light, const std::vector<float>& areas, std::vector<V3d>& power) {
+    for (std::size_t k = 0; k < light.values.size(); ++k) {
+        V3d& sum = power[k % light.groups];
+        for (int c = 0; c < 3; ++c) sum[c] += double(std::abs(light.values[k][c])) * double(areas[k / light.groups]);
+    }
+}
+
+void add_bounce(const Irradiance& light, const std::vector<Rgb>& scales, LitPoints& lit) {
+    for (std::size_t k = 0; k < light.values.size(); ++k) {
+        const Rgb& scale = scales[k % light.groups];
+        lit.irradiance[k] += light.values[k] * scale;
+        for (std::size_t c = 0; c < 3; ++c) lit.flows[k][c] += light.flows[k][c] * scale[static_cast<int>(c)];
+    }
+}
+
+// All bounces after the last over the last, were each the same part of the one before: r + r^2 + ... = r/(1 - r). Light that has
+// bounced a few times lies where its slowest part does, which then shrinks by one factor.
+std::vector<Rgb> tail_of(const std::vector<V3d>& before, const std::vector<V3d>& last) {
+    std::vector<Rgb> tail(last.size(), Rgb(0.0f));
+    for (std::size_t g = 0; g < last.size(); ++g) {
+        for (int c = 0; c < 3; ++c) {
+            const double ratio = before[g][c] != 0.0 ? std::min(last[g][c] / before[g][c], kLargestRatio) : 0.0;
+            if (ratio > 0.0) tail[g][c] = static_cast<float>(ratio / (1.0 - ratio));
+        }
+    }
+    return tail;
+}
+
 // The diffuse albedo of what a ray of a point meets; 0 for ice.
 Rgb diffuse_albedo(const Scene& scene, const SurfaceResolver& resolver, const BounceHit& hit) {
     const Material& material = scene.materials[scene.objects[hit.surface.placement].material];
@@ -190,6 +222,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         stats.dropped_samples += last[i].dropped_samples;
     }
 
+    std::vector<V3d> power, power_before;  // of the last two bounces, by group
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exchange> exchange(lit.size());
         for (std::size_t i = 0; i < lit.size(); ++i) {
@@ -199,6 +232,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             exchange[i] = exchange_of(*bodies[i], sets.points(i), sets.united(i, groups, values), groups, *gains[i],
                                       options.gather);
         }
+        power_before = std::move(power);
+        power.assign(groups, V3d(0.0));
         for (std::size_t i = 0; i < lit.size(); ++i) {
             if (last[i].values.empty()) continue;
             if (bounce > 0) {
@@ -207,13 +242,14 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             }
             add_light(sightlines[i], exchange, last[i]);
             keep_entering(entering[i], last[i]);
-            for (std::size_t k = 0; k < last[i].values.size(); ++k) {
-                lit[i].irradiance[k] += last[i].values[k];
-                for (std::size_t c = 0; c < 3; ++c) lit[i].flows[k][c] += last[i].flows[k][c];
-            }
+            add_power(last[i], lit[i].points.cloud().points().areas, power);
+            add_bounce(last[i], std::vector<Rgb>(groups, Rgb(1.0f)), lit[i]);
         }
         if (progress) progress->update("bounce", 1.0);  // rays took the time; asks whether to go on
     }
+    if (options.bake_bounces < kFewestForTail) return;
+    const std::vector<Rgb> rest = tail_of(power_before, power);
+    for (std::size_t i = 0; i < lit.size(); ++i) add_bounce(last[i], rest, lit[i]);
 }
 
 }  // namespace frazil
