@@ -47,4 +47,41 @@ TEST_CASE("cells: a sliver, long and with no area to speak of, is gathered as wh
     CHECK(std::abs(out.coverage[0].x) < 1e-6f);
 }
 
+TEST_CASE("cells: moved along their normals they are those of a smaller sphere, and so is what varies along them") {
+    const float radius = 1.0f, inwards = -0.3f;
+    const Mesh mesh = test::sphere(radius, 6), smaller = test::sphere(radius + inwards, 6);
+    const PointSet points = poisson_points(mesh, 0.2);
+    PointSet moved = points;
+    moved.spacing *= 1.0 + inwards;
+    for (V3f& position : moved.positions) position *= 1.0f + inwards;
+    const Cells cells = cells_of(points, mesh), expected = cells_of(moved, smaller);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        V3f centroid = cells.centroids[k];
+        Covariance covariance = cells.covariances[k];
+        move_along_normals(inwards, cells.normals[k], centroid, covariance);
+        CHECK((centroid - expected.centroids[k]).length() < 0.004f);
+        const float trace = covariance[0] + covariance[1] + covariance[2];
+        const Covariance& c = expected.covariances[k];
+        CHECK(trace == doctest::Approx(c[0] + c[1] + c[2]).epsilon(0.04));
+        const CellBend bend(cells.normals[k], cells.covariances[k], inwards);
+        const V3f along = tangent_frame(points.normals[k]).first, now = bend.moved(along);
+        CHECK((now - along * (1.0f + inwards)).length() < 0.03f);
+    }
+}
+
+TEST_CASE("cells: flat ones move without a change") {
+    const Mesh mesh = test::floor_square(1.0f, 0.0f);
+    const PointSet points = poisson_points(mesh, 0.2);
+    const Cells cells = cells_of(points, mesh);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        V3f centroid = cells.centroids[k];
+        Covariance covariance = cells.covariances[k];
+        move_along_normals(-0.5f, cells.normals[k], centroid, covariance);
+        CHECK((centroid - cells.centroids[k] + points.normals[k] * 0.5f).length() < 1e-6f);
+        for (int i = 0; i < 6; ++i) CHECK(covariance[i] == doctest::Approx(cells.covariances[k][i]).epsilon(1e-4));
+        const V3f along(0.3f, 0.0f, -0.2f);
+        CHECK((CellBend(cells.normals[k], cells.covariances[k], -0.5f).moved(along) - along).length() < 1e-5f);
+    }
+}
+
 }  // namespace frazil

@@ -20,6 +20,8 @@ constexpr float kLongestEdge = 0.7f, kLongestCoarseEdge = 16.0f;
 constexpr float kLongestPerRoot = 0.75f;
 constexpr std::size_t kPiecesPerCell = 16;  // or a few less
 constexpr std::size_t kPiecesPerChunk = 512;
+// Of the squared trace, the determinant of a cell in its plane: slivers have no bend across.
+constexpr float kThinnest = 1e-4f;
 // Spacings may have grown so much; and how many of them a point is looked for (PointLookup::nearest).
 constexpr double kMostStretch = 16.0, kFarthestOwner = 2.0;
 
@@ -61,33 +63,55 @@ void bisect(const Piece& piece, const Corners& corners, const IsDone& is_done) {
     bisect({piece.triangle, {a, middle, c}}, corners, is_done);
 }
 
+using Moments = std::array<double, 6>;  // in a Covariance's order
+
+// The symmetric part of a bᵀ.
+Moments product_of(const V3d& a, const V3d& b) {
+    return {a.x * b.x,
+            a.y * b.y,
+            a.z * b.z,
+            0.5 * (a.x * b.y + a.y * b.x),
+            0.5 * (a.x * b.z + a.z * b.x),
+            0.5 * (a.y * b.z + a.z * b.y)};
+}
+
+void add(Moments& sum, double weight, const Moments& more) {
+    for (std::size_t i = 0; i < 6; ++i) sum[i] += weight * more[i];
+}
+
 // What a chunk of pieces adds to one cell, about its point.
 struct CellSums {
     double area = 0.0;
-    V3d first = V3d(0.0);
-    std::array<double, 6> second{};
+    V3d first = V3d(0.0), normal = V3d(0.0);
+    Moments second{}, place_by_normal{}, normal_by_normal{};
 
     // A triangle: its corners and middle hold its moments up to the second.
-    void add(double weight, const V3d p[3], const V3d& about) {
+    void add(double weight, const V3d p[3], const V3d& about, const V3d& its_normal) {
         const V3d middle = (p[0] + p[1] + p[2]) / 3.0 - about;
         area += weight;
         first += middle * weight;
-        const auto add_square = [&](double share, const V3d& d) {
-            second[0] += share * d.x * d.x;
-            second[1] += share * d.y * d.y;
-            second[2] += share * d.z * d.z;
-            second[3] += share * d.x * d.y;
-            second[4] += share * d.x * d.z;
-            second[5] += share * d.y * d.z;
-        };
-        add_square(0.75 * weight, middle);
-        for (int k = 0; k < 3; ++k) add_square(weight / 12.0, p[k] - about);
+        normal += its_normal * weight;
+        frazil::add(second, 0.75 * weight, product_of(middle, middle));
+        for (int k = 0; k < 3; ++k) frazil::add(second, weight / 12.0, product_of(p[k] - about, p[k] - about));
+        frazil::add(place_by_normal, weight, product_of(middle, its_normal));
+        frazil::add(normal_by_normal, weight, product_of(its_normal, its_normal));
     }
 
     void add(const CellSums& other) {
         area += other.area;
         first += other.first;
-        for (int i = 0; i < 6; ++i) second[i] += other.second[i];
+        normal += other.normal;
+        frazil::add(second, 1.0, other.second);
+        frazil::add(place_by_normal, 1.0, other.place_by_normal);
+        frazil::add(normal_by_normal, 1.0, other.normal_by_normal);
+    }
+
+    // From sums of products, less what their means explain.
+    Covariance covariance(const Moments& sums, const V3d& a, const V3d& b) const {
+        const Moments explained = product_of(a, b);
+        Covariance result;
+        for (std::size_t i = 0; i < 6; ++i) result[i] = static_cast<float>(sums[i] / area - explained[i]);
+        return result;
     }
 };
 
@@ -216,7 +240,7 @@ bool fill_chunk(const PointSet& points, const Mesh& mesh, const PointLookup& loo
             }
             if (!(area > 0.0)) return true;
             if (sums.empty() || sums.back().first != owner) sums.push_back({owner, {}});
-            sums.back().second.add(area, p, V3d(points.positions[owner]));
+            sums.back().second.add(area, p, V3d(points.positions[owner]), V3d(normal));
             add_places(piece, owner, static_cast<float>(area), places_per_piece, seed, chunk.places);
             return true;
         });
@@ -257,6 +281,7 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
     cells.areas.assign(n, 0.0f);
     cells.centroids = points.positions;
     cells.covariances.assign(n, Covariance{});
+    cells.normals.resize(n);
     cells.first.assign(n + 1, 0);
     if (n == 0) return cells;
 
@@ -309,11 +334,10 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
             const V3d mean = s.first / s.area;
             cells.areas[k] = static_cast<float>(s.area);
             cells.centroids[k] = V3f(V3d(points.positions[k]) + mean);
-            const double product[6] = {mean.x * mean.x, mean.y * mean.y, mean.z * mean.z,
-                                       mean.x * mean.y, mean.x * mean.z, mean.y * mean.z};
-            for (int i = 0; i < 6; ++i) {
-                cells.covariances[k][i] = static_cast<float>(s.second[i] / s.area - product[i]);
-            }
+            cells.covariances[k] = s.covariance(s.second, mean, mean);
+            const V3d normal = s.normal / s.area;
+            cells.normals[k] = {V3f(normal), s.covariance(s.place_by_normal, mean, normal),
+                                s.covariance(s.normal_by_normal, normal, normal)};
         }
     });
 
@@ -340,6 +364,38 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
         }
     });
     return cells;
+}
+
+CellBend::CellBend(const CellNormals& normals, const Covariance& covariance, float distance) {
+    if (!(normals.mean.length2() > 0.0f)) return;
+    const auto [s, t] = tangent_frame(normals.mean.normalized());
+    const auto within = [](const Covariance& c, const V3f& a, const V3f& b) {
+        return a.dot(V3f(c[0] * b.x + c[3] * b.y + c[4] * b.z, c[3] * b.x + c[1] * b.y + c[5] * b.z,
+                         c[4] * b.x + c[5] * b.y + c[2] * b.z));
+    };
+    const float xx = within(covariance, s, s), xy = within(covariance, s, t), yy = within(covariance, t, t);
+    const float determinant = xx * yy - xy * xy;
+    if (!(determinant > kThinnest * (xx + yy) * (xx + yy))) return;
+    const Covariance& n = normals.with_place;
+    const float nxx = within(n, s, s), nxy = within(n, s, t), nyy = within(n, t, t), scale = distance / determinant;
+    axes_[0] = s;
+    axes_[1] = t;
+    change_[0][0] = scale * (nxx * yy - nxy * xy);
+    change_[0][1] = scale * (nxy * xx - nxx * xy);
+    change_[1][0] = scale * (nxy * yy - nyy * xy);
+    change_[1][1] = scale * (nyy * xx - nxy * xy);
+}
+
+V3f CellBend::moved(const V3f& v) const {
+    const float x = v.dot(axes_[0]), y = v.dot(axes_[1]);
+    return v + axes_[0] * (change_[0][0] * x + change_[0][1] * y) + axes_[1] * (change_[1][0] * x + change_[1][1] * y);
+}
+
+void move_along_normals(float distance, const CellNormals& normals, V3f& centroid, Covariance& covariance) {
+    centroid += normals.mean * distance;
+    for (std::size_t i = 0; i < 6; ++i) {
+        covariance[i] += distance * (2.0f * normals.with_place[i] + distance * normals.own[i]);
+    }
 }
 
 V3f position_of(const CellPlace& place, const Mesh& mesh) {

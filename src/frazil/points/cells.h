@@ -31,10 +31,17 @@ struct CellPlace {
     float area = 0.0f;
 };
 
+// How the normals of a cell vary over it: their mean, their covariance with the place, made symmetric, and their own.
+struct CellNormals {
+    V3f mean{0.0f};
+    Covariance with_place{}, own{};
+};
+
 struct Cells {
     std::vector<float> areas;
     std::vector<V3f> centroids;
     std::vector<Covariance> covariances;
+    std::vector<CellNormals> normals;
     // Places of point k are places[first[k]] to places[first[k + 1]]; none where no surface is nearest to it.
     std::vector<std::uint32_t> first;
     std::vector<CellPlace> places;
@@ -45,6 +52,21 @@ struct Cells {
 // `most_places` of each cell are kept, at most; more numerous pieces are sampled without bias [Duffield2007].
 // ValueError where points and mesh do not belong together.
 Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places = 64, std::uint32_t seed = 0);
+
+// How vectors along a cell change where all of it moves by `distance` along its normals: a linear map of its plane, by the
+// regression of normals on places.
+class CellBend {
+  public:
+    CellBend(const CellNormals& normals, const Covariance& covariance, float distance);
+    V3f moved(const V3f& v) const;
+
+  private:
+    V3f axes_[2] = {V3f(0.0f), V3f(0.0f)};
+    float change_[2][2] = {};
+};
+
+// Move all of a cell by this along its normals: a bent cell shrinks or grows, areas stay.
+void move_along_normals(float distance, const CellNormals& normals, V3f& centroid, Covariance& covariance);
 
 // A place's position and geometric normal.
 V3f position_of(const CellPlace& place, const Mesh& mesh);

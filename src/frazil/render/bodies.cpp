@@ -170,8 +170,9 @@ std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shar
                                            const std::vector<Rgb>& irradiance, std::size_t groups,
                                            std::vector<V3f> moments, bool is_on_surface) {
     auto clusters = is_on_surface ? points.cloud().surface_clusters() : points.cloud().clusters();
-    return std::make_shared<const PointTree>(std::move(clusters), std::move(kernel), irradiance, groups,
-                                             points.into_cloud(std::move(moments)));
+    moments = points.into_cloud(std::move(moments));
+    if (!is_on_surface) points.cloud().move_inwards(moments, groups);
+    return std::make_shared<const PointTree>(std::move(clusters), std::move(kernel), irradiance, groups, moments);
 }
 
 bool ThicknessTrees::is_shared(std::size_t leader) {

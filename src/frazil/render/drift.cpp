@@ -13,8 +13,9 @@ namespace {
 
 // The kernel's radius: in drift lengths, but so many spacings at least.
 constexpr float kReach = 3.0f, kFewestSpacings = 3.0f;
-// Light is handed on from places so many to the kernel's radius: points that are nearer to each other go together.
-constexpr float kPlaces = 3.0f;
+// Light is handed on from places so many to the kernel's radius: points that are nearer to each other go
+// together, where several do.
+constexpr float kPlaces = 3.0f, kFewestSpacingsTogether = 2.5f;
 // Of facing normals, and of the kernel's reach that lies between the surfaces, at least.
 constexpr float kGap = 0.1f;
 constexpr std::uint32_t kSeed = 0x726f6f6dU;
@@ -137,8 +138,8 @@ void carry_on(const PointSet& points, const std::vector<Flow>& flows, const Rgb&
     const float spacing = static_cast<float>(points.spacing);
     const float reach = std::max(kReach * max_component(length), kFewestSpacings * spacing);
     if (!(reach > 0.0f)) return;
-    const Sources sources =
-        make_sources(points, flows, length, room, reach > 1.5f * kPlaces * spacing ? reach / kPlaces : 0.0f);
+    const Sources sources = make_sources(points, flows, length, room,
+                                         reach > kFewestSpacingsTogether * kPlaces * spacing ? reach / kPlaces : 0.0f);
     const std::vector<Total> totals = totals_of(sources.places, points, reach);
     const PointLookup lookup(sources.places, reach);
     const Kernel kernel(reach);

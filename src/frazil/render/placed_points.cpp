@@ -23,6 +23,7 @@ void PointCloud::drop_places() {
     moments.areas = cells_->areas;
     moments.centroids = cells_->centroids;
     moments.covariances = cells_->covariances;
+    moments.normals = cells_->normals;
     cells_ = std::make_shared<const Cells>(std::move(moments));
 }
 
@@ -37,9 +38,9 @@ std::shared_ptr<const PointClusters> PointCloud::clusters() {
         cells.covariances = cells_->covariances;
     }
     for (std::size_t k = 0; k < room_.inwards.size(); ++k) {
-        const V3f inwards = points_.normals[k] * (-depth_ * room_.inwards[k]);
-        points.positions[k] += inwards;
-        if (cells_) cells.centroids[k] += inwards;
+        const float outwards = -depth_ * room_.inwards[k];
+        points.positions[k] += points_.normals[k] * outwards;
+        if (cells_) move_along_normals(outwards, cells_->normals[k], cells.centroids[k], cells.covariances[k]);
     }
     clusters_ = std::make_shared<const PointClusters>(cluster_points(points, cells_ ? &cells : nullptr));
     return clusters_;
@@ -84,6 +85,17 @@ std::vector<V3f> PointCloud::inward_positions() const {
     return positions;
 }
 
+void PointCloud::move_inwards(std::vector<V3f>& moments, std::size_t groups) const {
+    const std::lock_guard lock(mutex_);
+    if (!cells_ || room_.inwards.empty()) return;
+    parallel_for(moments.size() / groups, 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const CellBend bend(cells_->normals[k], cells_->covariances[k], -depth_ * room_.inwards[k]);
+            for (std::size_t g = 0; g < groups; ++g) moments[k * groups + g] = bend.moved(moments[k * groups + g]);
+        }
+    });
+}
+
 std::vector<float> PointCloud::room_along() const {
     const std::lock_guard lock(mutex_);
     return room_.along;
@@ -106,13 +118,19 @@ PointSet PlacedPoints::in_world() const {
 Cells PlacedPoints::cells_in_world() const {
     Cells result = *cloud_->cells();
     for (V3f& centroid : result.centroids) centroid = centroid * to_world_;
-    for (Covariance& c : result.covariances) {
-        // Turned row by row, then column by column.
+    const auto turn = [&](Covariance& c) {
+        // Row by row, then column by column.
         V3f rows[3] = {{c[0], c[3], c[4]}, {c[3], c[1], c[5]}, {c[4], c[5], c[2]}};
         for (V3f& row : rows) to_world_.multDirMatrix(V3f(row), row);
         V3f columns[3];
         for (int i = 0; i < 3; ++i) to_world_.multDirMatrix(V3f(rows[0][i], rows[1][i], rows[2][i]), columns[i]);
         c = {columns[0].x, columns[1].y, columns[2].z, columns[0].y, columns[0].z, columns[1].z};
+    };
+    for (Covariance& c : result.covariances) turn(c);
+    for (CellNormals& normals : result.normals) {
+        to_world_.multDirMatrix(V3f(normals.mean), normals.mean);
+        turn(normals.with_place);
+        turn(normals.own);
     }
     return result;
 }

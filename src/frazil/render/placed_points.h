@@ -37,6 +37,8 @@ class PointCloud {
     // Where light is scattered first, on the mean: what its clusters are made of, and exitance is summed at.
     std::vector<V3f> inward_positions() const;
     std::vector<float> room_along() const;
+    // Moments of light in cells, (N, groups), from the surface to there.
+    void move_inwards(std::vector<V3f>& moments, std::size_t groups) const;
 
     // What thin parts around its points return (thickness.h), for one body: made anew where the body it is `of` is another.
     using ThinBody = std::array<float, 9>;

@@ -87,6 +87,7 @@ void TranslucencySets::unite(Union& set) const {
             cells.areas.push_back(own_cells.areas[k]);
             cells.centroids.push_back(own_cells.centroids[k]);
             cells.covariances.push_back(own_cells.covariances[k]);
+            cells.normals.push_back(own_cells.normals[k]);
         }
     }
     set.points = PlacedPoints(std::move(points));
