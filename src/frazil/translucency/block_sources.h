@@ -45,7 +45,7 @@ class BlockSources {
   private:
     const PointClusters& clusters() const { return *tree_.clusters; }
     void add_point(std::uint32_t p);
-    void add_part(const PointCell& cell, const V3f& center, float area, float share, float largest_squared);
+    void add_part(std::uint32_t p, const PointCell& cell, V3f center, float share, float largest_squared);
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared);
     void add_split(std::uint32_t p, const PointCell& cell, const CellFrame& frame, const V2f& z, float share,
                    float largest_squared);
