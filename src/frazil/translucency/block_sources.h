@@ -29,8 +29,7 @@ inline float squared_distance(const Box3f& box, const V3f& p) {
 class BlockSources {
   public:
     // `has_footprints`: points stand for their cells.
-    BlockSources(const PointTree::Impl& tree, const OpeningRule& rule, bool has_footprints)
-        : tree_(tree), rule_(rule), has_footprints_(has_footprints) {}
+    BlockSources(const PointTree::Impl& tree, const OpeningRule& rule, bool has_footprints);
 
     void clear() { list_.clear(); }
     void add_cluster(std::uint32_t index);
@@ -53,6 +52,7 @@ class BlockSources {
     const PointTree::Impl& tree_;
     const OpeningRule& rule_;
     bool has_footprints_;
+    float farthest_off_;  // metres
     SourceList list_;
     std::vector<V2f> leans_;  // of each group's power in the cell that is being cut
 };
