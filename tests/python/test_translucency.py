@@ -433,6 +433,18 @@ def test_the_brightest_ramps_stay_finite():
             assert out.exitance.max() > 1e4
 
 
+def test_a_profile_without_bound_holds_at_coarse_points():
+    """1/r at r = 0: in the middle of a cell two free paths wide sums were wrong by half."""
+    profile = fz.NormalizedDiffusion(fz.Medium(30.0, (0.6, 0.15, 0.05), eta=1.0))
+    corners = np.array([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]])
+    points = fz.poisson_points(fz.Mesh(corners, [[0, 1, 2], [0, 2, 3]]), 0.0667)
+    tree = fz.PointTree(points, np.ones((len(points), 3)), profile)
+    places = points.positions[::16]
+    out, exact = tree.gather(places), tree.gather_exact(places)
+    np.testing.assert_allclose(out.coverage, exact.coverage, rtol=0.1)
+    np.testing.assert_allclose(out.exitance[:, 0], exact.exitance[:, 0], rtol=0.1)
+
+
 def test_coefficients_beyond_those_of_matter():
     """Free paths far shorter than light overflowed to NaN."""
     with pytest.raises(ValueError, match=r"Medium: sigma_s_prime [+] sigma_a must be at most 1e[+]08, got 1e[+]18"):

@@ -29,8 +29,7 @@ inline float squared_distance(const Box3f& box, const V3f& p) {
 class BlockSources {
   public:
     // `has_footprints`: points stand for their cells.
-    BlockSources(const PointTree::Impl& tree, const OpeningRule& rule, bool has_footprints)
-        : tree_(tree), rule_(rule), has_footprints_(has_footprints) {}
+    BlockSources(const PointTree::Impl& tree, const OpeningRule& rule, bool has_footprints);
 
     void clear() { list_.clear(); }
     void add_cluster(std::uint32_t index);
@@ -45,7 +44,7 @@ class BlockSources {
   private:
     const PointClusters& clusters() const { return *tree_.clusters; }
     void add_point(std::uint32_t p);
-    void add_part(const PointCell& cell, const V3f& center, float area, float share, float largest_squared);
+    void add_part(std::uint32_t p, const PointCell& cell, V3f center, float share, float largest_squared);
     void add_whole(std::uint32_t p, const PointCell& cell, float largest_squared);
     void add_split(std::uint32_t p, const PointCell& cell, const CellFrame& frame, const V2f& z, float share,
                    float largest_squared);
@@ -53,6 +52,7 @@ class BlockSources {
     const PointTree::Impl& tree_;
     const OpeningRule& rule_;
     bool has_footprints_;
+    float farthest_off_;  // metres
     SourceList list_;
     std::vector<V2f> leans_;  // of each group's power in the cell that is being cut
 };

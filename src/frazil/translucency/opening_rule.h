@@ -1,9 +1,9 @@
 // How large a cluster may be at a distance, so that a gather keeps to its tolerance.
 // Model: a cluster's mean kernel is exact to second order, so its error grows as (size * bend)³, bend the profile's
-//   relative change per metre, whatever light is on it: any group's sum is as exact, also where it alone is dark.
+//   relative change per metre, whatever light is on it, so that a group is held to it also where it alone is dark.
 // Units: metres.
-// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.11 % RMS and 0.4 % at worst, 0.003 0.04 % and 0.2 %; where
-//   light is down to 1e-5 of its mean, 0.5 % and 3 % at the default tolerance (test_light_that_is_dark_among_others_is_as_exact).
+// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.11 % RMS and 0.4 % at worst, 0.003 0.04 % and 0.2 %; by
+//   other bodies and lights: docs/translucency.md.
 // Not: a bound; it is calibrated.
 #pragma once
 
