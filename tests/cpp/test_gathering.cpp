@@ -151,6 +151,25 @@ TEST_CASE("gathering: what the camera sees itself is gathered there, overlays in
           2 * (1 + 1 + 6 + 2) + 2);  // translucency, knots, modes and two of the overlay, by group; two of coverage
 }
 
+TEST_CASE("gathering: places of a pixel share a gather within half a spacing, however far a mean free path is") {
+    const LayeredBall ball(0.05f, 1.0f, false);
+    const float spacing = ball.bodies[0]->spacing;
+    const auto gathers = [&](float apart) {
+        Tile tile(1, ball.layout.groups.size(), ball.layout.plane_count());
+        for (const float x : {0.1f * spacing, 0.1f * spacing + apart}) {
+            GatherRequest request;
+            request.is_primary = true;
+            request.position = V3f(x, 0.0f, 1.0f);
+            request.normal = V3f(0.0f, 0.0f, 1.0f);
+            tile.requests.push_back(request);
+        }
+        Gathering(ball.scene, ball.bodies, ball.layout).answer({}, tile);
+        return tile.gathers;
+    };
+    CHECK(gathers(0.2f * spacing) == 1);
+    CHECK(gathers(0.6f * spacing) == 2);
+}
+
 TEST_CASE("gathering: layers of compensations leave the light as it is rendered to the bit") {
     std::uint64_t gathers = 0;
     LayeredBall plain(0.2f, 1.0f, true);

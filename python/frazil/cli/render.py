@@ -96,7 +96,8 @@ def render_command(
     bake_bounces: Annotated[
         int,
         typer.Option(
-            metavar="N", help="Of light between ice, ice and diffuse surfaces; from 3 on with all that is left after."
+            metavar="N",
+            help="Of light that reaches ice by way of ice and diffuse surfaces. From 3 on, what is left is added.",
         ),
     ] = 4,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = RENDER_TOLERANCE,

@@ -202,8 +202,7 @@ void add_points(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bo
         if (!(shape.area > 0.0)) continue;
         try {
             const float spacing = point_spacing(*bodies[i], shape.area, options);
-            const Rgb extinction = bodies[i]->medium.sigma_s_prime + bodies[i]->medium.sigma_a;
-            coarse.add(object.path, spacing, 1.0f / max_component(extinction));
+            coarse.add(object.path, spacing, bodies[i]->mean_free_path());
             lit[i].points = shapes.points_of(object, *bodies[i], shape, spacing, options, progress);
         } catch (const ValueError& error) {
             throw ValueError(str(object.path, ": ", error.what()));
@@ -290,10 +289,9 @@ float point_spacing(const Body& body, double area, const RenderOptions& options)
     float spacing = options.spacing;
     if (spacing == 0.0f) spacing = body.material->spacing.value;
     if (spacing == 0.0f) {
-        const Rgb sigma_t_prime = body.medium.sigma_s_prime + body.medium.sigma_a;
         const double finest = std::sqrt(kPointsPerSpacing2 * area / kMostByDefault);
         const double coarsest = std::sqrt(kPointsPerSpacing2 * area / kFewestByDefault);
-        spacing = static_cast<float>(std::clamp(kDefaultSpacing / max_component(sigma_t_prime), finest, coarsest));
+        spacing = static_cast<float>(std::clamp(kDefaultSpacing * body.mean_free_path(), finest, coarsest));
     }
     return spacing * options.spacing_scale;
 }

@@ -132,8 +132,8 @@ void add_bounce(const Irradiance& light, const std::vector<Rgb>& scales, LitPoin
     }
 }
 
-// All bounces after the last over the last, were each the same part of the one before: r + r^2 + ... = r/(1 - r). Light that has
-// bounced a few times lies where its slowest part does, which then shrinks by one factor.
+// All bounces after the last over the last, were each the same part of the one before: r + r² + ... = r/(1 - r). Light that
+// has bounced a few times lies where its slowest part does, which then shrinks by one factor.
 std::vector<Rgb> tail_of(const std::vector<V3d>& before, const std::vector<V3d>& last) {
     std::vector<Rgb> tail(last.size(), Rgb(0.0f));
     for (std::size_t g = 0; g < last.size(); ++g) {
@@ -222,6 +222,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         stats.dropped_samples += last[i].dropped_samples;
     }
 
+    const std::vector<Rgb> whole(groups, Rgb(1.0f));
     std::vector<V3d> power, power_before;  // of the last two bounces, by group
     for (int bounce = 0; bounce < options.bake_bounces; ++bounce) {
         std::vector<Exchange> exchange(lit.size());
@@ -243,7 +244,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
             add_light(sightlines[i], exchange, last[i]);
             keep_entering(entering[i], last[i]);
             add_power(last[i], lit[i].points.cloud().points().areas, power);
-            add_bounce(last[i], std::vector<Rgb>(groups, Rgb(1.0f)), lit[i]);
+            add_bounce(last[i], whole, lit[i]);
         }
         if (progress) progress->update("bounce", 1.0);  // rays took the time; asks whether to go on
     }

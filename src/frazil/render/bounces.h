@@ -16,7 +16,8 @@ namespace frazil {
 // Scale the light of points by the part that their overlays let enter (SurfaceResolver::entering).
 void keep_entering(const std::vector<float>& entering, Irradiance& irradiance);
 
-// Add options.bake_bounces bounces, and what is left after them, to the irradiance of every body's points; `lit` runs along with `bodies`.
+// Add options.bake_bounces bounces, and what is left after them, to the irradiance of every body's points; `lit` runs along
+// with `bodies`.
 void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampler& lights,
                  const RenderOptions& options, const std::vector<std::unique_ptr<Body>>& bodies,
                  std::vector<LitPoints>& lit, RenderStats& stats, Progress* progress);

@@ -32,8 +32,8 @@ struct RenderOptions {
     // Shadow rays of the bake go on through ice, dimmed. Off: light that enters ice is counted as diffused there, and what
     // also went straight on would be counted twice; on for thin clear ice, whose light that is.
     bool translucent_shadows = false;
-    int bake_bounces =
-        4;  // of light that reaches the points by way of ice and diffuse surfaces; from 3 on the rest as a series
+    // Of light that reaches the points by way of ice and diffuse surfaces; from 3 on, all that is left is added (bounces.h).
+    int bake_bounces = 4;
     GatherOptions gather;
     std::vector<std::pair<std::string, std::string>> lpes;  // light path expressions: a layer's name, and what it keeps
     std::vector<std::string> aovs;                          // of the table, beside those that are made anyway
