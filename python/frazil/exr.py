@@ -22,7 +22,8 @@ __all__ = ["COMPRESSIONS", "channel_names", "read_exr", "read_header", "write_ex
 _OWN_ATTRIBUTES = ("compression", "name", "chunkCount", "dataWindow", "displayWindow")
 LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
 COMPRESSIONS = ("none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
-STRIP = 256  # rows written at a time: a multiple of every compression's block
+# Rows written at a time: a multiple of every compression's block; few, so that they stay in the cache.
+STRIP, TALL_STRIP = 32, 256
 
 
 def channel_names(layer: str, letters: str) -> list[str]:
@@ -137,17 +138,28 @@ def write_exr(
             for i, (part, spec) in enumerate(zip(parts, specs, strict=True)):
                 if i > 0:
                     check_written(output.open(str(temporary), spec, "AppendSubimage"), output)
-                for top in range(0, height, STRIP):
-                    bottom = min(height, top + STRIP)
-                    # Half arrays for half channels are stored as they are.
-                    is_half = set(part.formats) == {"half"} and all(a.dtype == np.float16 for a in part.arrays)
-                    kind = np.float16 if is_half else np.float32
-                    strip = np.stack([array[top:bottom] for array in part.arrays], axis=-1, dtype=kind)
-                    check_written(output.write_scanlines(spec.y + top, spec.y + bottom, 0, strip), output)
+                for top, strip in _strips(part):
+                    check_written(output.write_scanlines(spec.y + top, spec.y + top + len(strip), 0, strip), output)
         finally:
             closed = output.close()
         check_written(closed, output)
     return promoted
+
+
+def _strips(part: _Part) -> Iterator[tuple[int, np.ndarray]]:
+    """The rows of a part, (rows, W, channels) at a time, and the first row of each."""
+    height, width = part.arrays[0].shape
+    rows = TALL_STRIP if part.compression == "dwab" else STRIP
+    # Half arrays for half channels are stored as they are.
+    is_half = set(part.formats) == {"half"} and all(array.dtype == np.float16 for array in part.arrays)
+    # Channel after channel, then turned over: an eighth of the time that interleaving them one by one takes, as each
+    # goes far through memory. The odd length keeps the turned array's rows from falling on the same lines of the cache.
+    planar = np.empty((len(part.arrays), rows * width + 32), np.float16 if is_half else np.float32)
+    for top in range(0, height, rows):
+        count = min(rows, height - top)
+        for channel, array in zip(planar, part.arrays, strict=True):
+            channel[: count * width].reshape(count, width)[:] = array[top : top + count]
+        yield top, np.ascontiguousarray(planar[:, : count * width].T).reshape(count, width, -1)
 
 
 def _spec_of(oiio: Any, part: _Part, metadata: Mapping[str, Any], is_first: bool) -> Any:
@@ -263,7 +275,7 @@ def _read_part(
     kind = (
         "half" if all(array.dtype == np.float16 for array in arrays.values()) and set(formats) == {"half"} else "float"
     )
-    rows = max(16, STRIP * 16 // max(spec.nchannels, 16) // 16 * 16)
+    rows = max(16, TALL_STRIP * 16 // max(spec.nchannels, 16) // 16 * 16)
     for top in range(0, spec.height, rows):
         bottom = min(spec.height, top + rows)
         strip = source.read_scanlines(spec.y + top, spec.y + bottom, 0, 0, spec.nchannels, kind)

@@ -381,7 +381,7 @@ Mesh box(float s) {
 TEST_CASE("bounce: walls of radiance 1 all around give pi, per group, and T weighs the entry") {
     const RayScene scene({box(1.0f)}, {{0, M44f()}});
     const PointSet points = grid_of_points(3);
-    const BounceRadiance walls = [](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
+    const BounceRadiance walls = [](std::size_t, std::span<const BounceHit> hits, std::span<Rgb> radiance) {
         for (std::size_t i = 0; i < hits.size(); ++i) {
             const V3f p(std::abs(hits[i].position.x), std::abs(hits[i].position.y), std::abs(hits[i].position.z));
             CHECK_UNARY(max_component(p) == doctest::Approx(1.0));

@@ -1,5 +1,9 @@
 #include <doctest/doctest.h>
 
+#include <cmath>
+
+#include "frazil/base/sampler.h"
+#include "frazil/base/trigonometry.h"
 #include "frazil/geometry/ray_scene.h"
 
 using namespace frazil;
@@ -59,6 +63,43 @@ TEST_CASE("occlusion respects the end of the ray, and an empty scene occludes no
     CHECK(scene.is_occluded({V3f(0.5f, 0.4f, 1.0f), kDown, 0.0f, 2.0f}));
     CHECK_FALSE(scene.is_occluded({V3f(0.5f, 0.4f, 1.0f), kDown, 0.0f, 0.5f}));
     CHECK_FALSE(RayScene({}, {}).is_occluded({V3f(0.5f, 0.4f, 1.0f), kDown}));
+}
+
+TEST_CASE("many rays at once see what each sees alone, in any directions and any number") {
+    const std::vector<Mesh> meshes = {square()};
+    M44f mirrored = moved(-1, 0, 0.5f);
+    mirrored[0][0] = -1.0f;
+    const RayScene scene(meshes, {{0, M44f()}, {0, mirrored}, {0, moved(0.5f, 0.5f, 1.0f)}});
+    Sampler random(1, 2, 3);
+    for (const std::size_t count : {0U, 1U, 7U, 8U, 1000U}) {
+        std::vector<Ray> rays;
+        for (std::size_t i = 0; i < count; ++i) {
+            const V2f u = random.next_2d(), v = random.next_2d();
+            const V3f local = cosine_hemisphere(v);
+            rays.push_back({V3f(4.0f * u.x - 2.0f, 2.0f * u.y - 0.5f, 0.25f), {local.x, local.y, local.z}});
+            if (i % 2) rays.back().direction.z *= -1.0f;
+            if (i % 3 == 0) rays.back().t_max = 0.5f;
+        }
+        std::vector<Hit> hits(count);
+        std::vector<std::uint8_t> is_occluded(count);
+        scene.intersect(rays, hits);
+        scene.are_occluded(rays, is_occluded);
+        std::size_t met = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            Hit alone;
+            const bool is_hit = scene.intersect(rays[i], alone);
+            REQUIRE(is_hit == std::isfinite(hits[i].t));
+            REQUIRE(is_hit == bool(is_occluded[i]));
+            met += is_hit;
+            if (!is_hit) continue;
+            CHECK(hits[i].t == doctest::Approx(alone.t));
+            CHECK(hits[i].placement == alone.placement);
+            CHECK(hits[i].triangle == alone.triangle);
+            CHECK((hits[i].uv - alone.uv).length() < 1e-5f);
+            CHECK((hits[i].geometric_normal - alone.geometric_normal).length() < 1e-6f);
+        }
+        if (count == 1000) CHECK((met > 100 && met < 900));
+    }
 }
 
 TEST_CASE("an offset origin does not meet its own surface, near the origin or far from it") {

@@ -1,6 +1,9 @@
 #include "frazil/geometry/ray_scene.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 
 #include "frazil/base/error.h"
 #include "frazil/geometry/embree.h"
@@ -17,6 +20,62 @@ void set_ray(const Ray& ray, RTCRay& out) {
     out.mask = ~0U;
     out.id = 0;
     out.flags = 0;
+}
+
+constexpr std::size_t kPacket = 8;
+
+// The cell of a ray's direction on an octahedron's square [Cigolle2014], cells in Morton order.
+constexpr int kCellBits = 5;
+std::uint32_t direction_cell(const V3f& d) {
+    const float scale = 1.0f / (std::abs(d.x) + std::abs(d.y) + std::abs(d.z));
+    float u = d.x * scale, v = d.y * scale;
+    if (d.z < 0.0f) {
+        const float folded = (1.0f - std::abs(v)) * std::copysign(1.0f, u);
+        v = (1.0f - std::abs(u)) * std::copysign(1.0f, v);
+        u = folded;
+    }
+    const auto cell = [](float x) {
+        constexpr float kCells = 1 << kCellBits;
+        const float scaled = (x + 1.0f) * (0.5f * kCells);
+        return scaled > 0.0f ? std::min(std::uint32_t(scaled), (1U << kCellBits) - 1) : 0U;
+    };
+    const std::uint32_t x = cell(u), y = cell(v);
+    std::uint32_t code = 0;
+    for (int bit = 0; bit < kCellBits; ++bit) {
+        code |= ((x >> bit) & 1U) << (2 * bit) | ((y >> bit) & 1U) << (2 * bit + 1);
+    }
+    return code;
+}
+
+// use(indices, count) for packets of rays, those that look alike together: packets go through the scene as one as long as
+// their rays do. Rays of one cell of directions stay in the order given.
+template <class Use>
+void for_each_packet(std::span<const Ray> rays, const Use& use) {
+    thread_local std::vector<std::uint32_t> cells, order;
+    std::array<std::uint32_t, (std::size_t(1) << (2 * kCellBits)) + 1> first{};
+    cells.resize(rays.size()), order.resize(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        cells[i] = direction_cell(rays[i].direction);
+        ++first[cells[i] + 1];
+    }
+    for (std::size_t cell = 0; cell + 1 < first.size(); ++cell) first[cell + 1] += first[cell];
+    for (std::size_t i = 0; i < rays.size(); ++i) order[first[cells[i]]++] = std::uint32_t(i);
+    for (std::size_t begin = 0; begin < order.size(); begin += kPacket) {
+        use(&order[begin], std::min(kPacket, order.size() - begin));
+    }
+}
+
+// A packet of rays by their indices; the rest of its lanes is off.
+void fill_packet(std::span<const Ray> rays, const std::uint32_t* index, std::size_t count, int* valid,
+                 RTCRay8& packet) {
+    for (std::size_t i = 0; i < kPacket; ++i) {
+        valid[i] = i < count ? -1 : 0;
+        const Ray& ray = rays[index[i < count ? i : 0]];
+        packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
+        packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
+        packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
+        packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
+    }
 }
 
 }  // namespace
@@ -226,7 +285,6 @@ bool RayScene::is_occluded(const Ray& ray) const {
 }
 
 void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const {
-    constexpr std::size_t kWidth = 8;
 #if FRAZIL_EMBREE_MAJOR >= 4
     RTCOccludedArguments arguments;
     rtcInitOccludedArguments(&arguments);
@@ -234,25 +292,55 @@ void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> o
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
 #endif
-    for (std::size_t begin = 0; begin < rays.size(); begin += kWidth) {
-        const std::size_t count = std::min(kWidth, rays.size() - begin);
-        alignas(32) int valid[kWidth];
+    for_each_packet(rays, [&](const std::uint32_t* index, std::size_t count) {
+        alignas(32) int valid[kPacket];
         alignas(32) RTCRay8 packet;
-        for (std::size_t i = 0; i < kWidth; ++i) {
-            valid[i] = i < count ? -1 : 0;
-            const Ray& ray = rays[begin + (i < count ? i : 0)];
-            packet.org_x[i] = ray.origin.x, packet.org_y[i] = ray.origin.y, packet.org_z[i] = ray.origin.z;
-            packet.dir_x[i] = ray.direction.x, packet.dir_y[i] = ray.direction.y, packet.dir_z[i] = ray.direction.z;
-            packet.tnear[i] = ray.t_min, packet.tfar[i] = ray.t_max;
-            packet.time[i] = 0.0f, packet.mask[i] = ~0U, packet.id[i] = 0, packet.flags[i] = 0;
-        }
+        fill_packet(rays, index, count, valid, packet);
 #if FRAZIL_EMBREE_MAJOR >= 4
         rtcOccluded8(valid, impl_->top, &packet, &arguments);
 #else
         rtcOccluded8(valid, impl_->top, &context, &packet);
 #endif
-        for (std::size_t i = 0; i < count; ++i) out[begin + i] = packet.tfar[i] < 0.0f;
-    }
+        for (std::size_t i = 0; i < count; ++i) out[index[i]] = packet.tfar[i] < 0.0f;
+    });
+}
+
+void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
+#if FRAZIL_EMBREE_MAJOR >= 4
+    RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+#endif
+    for_each_packet(rays, [&](const std::uint32_t* index, std::size_t count) {
+        alignas(32) int valid[kPacket];
+        alignas(32) RTCRayHit8 packet;
+        fill_packet(rays, index, count, valid, packet.ray);
+        for (std::size_t i = 0; i < kPacket; ++i) {
+            packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+            packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        }
+#if FRAZIL_EMBREE_MAJOR >= 4
+        rtcIntersect8(valid, impl_->top, &packet, &arguments);
+#else
+        rtcIntersect8(valid, impl_->top, &context, &packet);
+#endif
+        for (std::size_t i = 0; i < count; ++i) {
+            if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+                hits[index[i]] = Hit();
+                hits[index[i]].t = std::numeric_limits<float>::infinity();
+                continue;
+            }
+            RTCRayHit one;
+            one.ray.tfar = packet.ray.tfar[i];
+            one.hit.Ng_x = packet.hit.Ng_x[i], one.hit.Ng_y = packet.hit.Ng_y[i], one.hit.Ng_z = packet.hit.Ng_z[i];
+            one.hit.u = packet.hit.u[i], one.hit.v = packet.hit.v[i];
+            one.hit.primID = packet.hit.primID[i], one.hit.geomID = packet.hit.geomID[i];
+            one.hit.instID[0] = packet.hit.instID[0][i];
+            hits[index[i]] = impl_->to_hit(one);
+        }
+    });
 }
 
 V3f offset_origin(const V3f& position, const V3f& normal) {

@@ -30,8 +30,8 @@ struct Hit {
     float t = 0.0f;
     std::uint32_t placement = 0;  // index into the placements that the RayScene was made of
     std::uint32_t triangle = 0;
-    V2f uv;                // barycentrics of the triangle's second and third corner
-    V3f geometric_normal;  // unit length, world space, on the side that the winding tells
+    V2f uv{0.0f};                // barycentrics of the triangle's second and third corner
+    V3f geometric_normal{0.0f};  // unit length, world space, on the side that the winding tells
 };
 
 // One mesh somewhere in the world; `mesh` is an index.
@@ -75,8 +75,10 @@ class RayScene {
     bool intersect(const Ray& ray, Hit& hit) const;
     // Whether anything lies in (t_min, t_max).
     bool is_occluded(const Ray& ray) const;
-    // The same for many rays at once; faster where rays that follow one another are alike. out[i] is 1 or 0.
+    // The same for many rays at once, out[i] 1 or 0, and hits[i].t infinite where there is none. Rays of like direction are traced
+    // together: faster the more there are and the nearer those that follow one another start.
     void are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const;
+    void intersect(std::span<const Ray> rays, std::span<Hit> hits) const;
 
     // The same among some of the placements.
     bool intersect(const Ray& ray, Hit& hit, PlacementMask mask) const;

@@ -3,6 +3,7 @@
 #include <atomic>
 
 #include "frazil/base/error.h"
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/random.h"
 #include "frazil/base/sampler.h"
@@ -26,6 +27,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
     if (options.with_flows) result.flows.assign(result.values.size(), Flow{});
     result.rays = std::uint64_t(points.size()) * std::uint64_t(options.samples);
     const ScrambledNet net(options.samples);
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
     std::atomic<std::uint64_t> dropped{0};
     std::atomic<std::size_t> done{0};
     parallel_for(points.size(), kPointsPerBounceBatch, [&](std::size_t begin, std::size_t end) {
@@ -33,31 +35,40 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
         std::vector<V2f> u(net.size());
         std::vector<Place> places;
         std::vector<std::uint32_t> place_of(net.size());
-        std::vector<BounceHit> hits;
-        for (std::size_t i = begin; i < end; ++i) {
-            find_places(points, options.cells, std::uint32_t(i), places);
-            net.draw(hash(options.seed, 0x626f756eU), std::uint32_t(i), u);
-            deal(places, 0, hash(options.seed, std::uint32_t(i)), place_of);
-            for (std::size_t k = 0; k < u.size(); ++k) {
-                const Place& place = places[place_of[k]];
-                const V3f local = cosine_hemisphere(u[k]);
+        std::vector<BounceHit> all;
+        std::vector<Ray> rays;
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::uint32_t i = order[k];
+            find_places(points, options.cells, i, places);
+            net.draw(hash(options.seed, 0x626f756eU), i, u);
+            deal(places, 0, hash(options.seed, i), place_of);
+            for (std::size_t sample = 0; sample < u.size(); ++sample) {
+                const Place& place = places[place_of[sample]];
+                const V3f local = cosine_hemisphere(u[sample]);
                 const auto [s, t] = tangent_frame(place.normal);
                 BounceHit hit;
-                hit.point = std::uint32_t(i);
+                hit.point = i;
                 hit.direction = s * local.x + t * local.y + place.normal * local.z;
-                const V3f origin = offset_origin(place.position, place.normal);
-                if (!scene.intersect({origin, hit.direction}, hit.surface)) continue;
                 hit.along = along_surface(hit.direction, place.normal);
-                hit.position = origin + hit.direction * hit.surface.t;
                 // Cosine-distributed rays leave pi T L / n.
                 hit.weight =
                     transmittance(std::max(0.0f, hit.direction.dot(place.normal))) * (kPi / float(options.samples));
-                hits.push_back(hit);
+                rays.push_back({offset_origin(place.position, place.normal), hit.direction});
+                all.push_back(hit);
             }
+        }
+        std::vector<Hit> found(rays.size());
+        scene.intersect(rays, found);
+        std::vector<BounceHit> hits;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            if (found[i].t == std::numeric_limits<float>::infinity()) continue;
+            all[i].surface = found[i];
+            all[i].position = rays[i].origin + rays[i].direction * found[i].t;
+            hits.push_back(all[i]);
         }
         // Ask what the surfaces send, and let it in.
         std::vector<Rgb> sent(hits.size() * groups, Rgb(0.0f));
-        radiance(hits, sent);
+        radiance(begin / kPointsPerBounceBatch, hits, sent);
         for (std::size_t i = 0; i < hits.size(); ++i) {
             for (std::size_t g = 0; g < groups; ++g) {
                 const Rgb value = sent[i * groups + g] * hits[i].weight;
@@ -81,8 +92,8 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
 
 BounceRadiance reflected_light(const RayScene& scene, const LightSampler& lights,
                                std::function<Rgb(const BounceHit&)> albedo, int samples, std::uint32_t seed) {
-    return [&scene, &lights, albedo = std::move(albedo), samples, seed](std::span<const BounceHit> hits,
-                                                                        std::span<Rgb> radiance) {
+    return [&scene, &lights, albedo = std::move(albedo), samples, seed](
+               std::size_t batch, std::span<const BounceHit> hits, std::span<Rgb> radiance) {
         // The surfaces that reflect become points of their own, on the side that is seen.
         PointSet lit;
         IrradianceOptions options;
@@ -99,9 +110,8 @@ BounceRadiance reflected_light(const RayScene& scene, const LightSampler& lights
             share.push_back(a * kInvPi);
         }
         if (index.empty()) return;
-        // Another seed for every batch: its first point tells it apart.
         options.samples = samples;
-        options.seed = hash(seed, hits.front().point);
+        options.seed = hash(seed, std::uint32_t(batch));  // another for every batch
         options.component = LightComponent::diffuse;
         const Irradiance direct = bake_irradiance(
             lit, scene, lights, [](float) { return Rgb(1.0f); }, options);

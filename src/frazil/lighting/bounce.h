@@ -18,19 +18,20 @@ namespace frazil {
 // A surface that a point sees.
 struct BounceHit {
     std::uint32_t point = 0;  // index into the points
-    V3f position;             // on the surface, metres
-    V3f direction;            // from the point to the surface, unit length
+    V3f position{0.0f};       // on the surface, metres
+    V3f direction{0.0f};      // from the point to the surface, unit length
     Rgb weight = Rgb(0.0f);   // sr: what the radiance along the ray counts in the point's irradiance, pi T / n
-    V3f along;                // where its light travels along the point's surface: along_surface()
+    V3f along{0.0f};          // where its light travels along the point's surface: along_surface()
     Hit surface;
 };
 
-// Points whose hits make one batch: the first of a batch is a multiple of this.
+// Points whose hits make one batch: neighbours in space.
 inline constexpr std::size_t kPointsPerBounceBatch = 256;
 
 // Fill radiance[i * groups + g] with what hits[i] sends back along its ray, per light group; 0 as they come. Called from
-// several threads at once, once for every batch of points, whose cut does not depend on the number of threads.
-using BounceRadiance = std::function<void(std::span<const BounceHit> hits, std::span<Rgb> radiance)>;
+// several threads at once, once for every batch of points, 0, 1 ... in all; their cut does not depend on the number of
+// threads, and the hits of a point are in one batch.
+using BounceRadiance = std::function<void(std::size_t batch, std::span<const BounceHit> hits, std::span<Rgb> radiance)>;
 
 // (N, groups) irradiance that surfaces send to the points. options.samples counts rays per point.
 Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_t groups,

@@ -1,38 +1,18 @@
 #include "frazil/lighting/irradiance.h"
 
+#include <algorithm>
 #include <atomic>
 
 #include "frazil/base/error.h"
-#include "frazil/base/morton.h"
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/radix_sort.h"
 #include "frazil/lighting/bake_rays.h"
 #include "frazil/lighting/shadow.h"
 
 namespace frazil {
 namespace {
 
-constexpr std::size_t kPointsPerChunk = 64;
-
-// Points along a Morton curve: neighbours on it trace similar rays.
-std::vector<std::uint32_t> spatial_order(const std::vector<V3f>& positions) {
-    Box3f box;
-    for (const V3f& p : positions) box.extendBy(p);
-    const MortonGrid grid(box);
-    std::vector<KeyedIndex> keys(positions.size()), scratch;
-    for (std::uint32_t i = 0; i < positions.size(); ++i) keys[i] = {grid.code(positions[i]), i};
-    radix_sort(keys, 3 * kMortonBits, scratch);
-    std::vector<std::uint32_t> order(keys.size());
-    for (std::size_t i = 0; i < keys.size(); ++i) order[i] = keys[i].index;
-    return order;
-}
-
-// What one chunk of points needs again and again.
-struct Workspace : BakeRays {
-    std::vector<Rgb> factors;     // what is left of each ray's light
-    std::vector<float> arriving;  // luminance by sample
-    std::uint64_t traced = 0;
-};
+constexpr std::size_t kRaysPerBatch = 4096, kMostPointsPerBatch = 256;  // of one light; they fit in the cache
 
 // What a task brings to a point: sums over rounds.
 struct Estimate {
@@ -51,35 +31,43 @@ double absolute_luminance(const Rgb& c) {
     return double(luminance({std::abs(c.x), std::abs(c.y), std::abs(c.z)}));
 }
 
-// Trace a round's rays.
-void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& task, Workspace& work,
-           Estimate& estimate) {
-    work.factors.resize(work.rays.size());
-    if (task.light < 0) {
-        shadow_factors(scene, lights, work.lights, work.rays, work.factors);
-    } else {
-        shadow_factors(scene, lights, task.light, work.rays, work.factors);
-    }
-    work.traced += work.rays.size();
-    work.arriving.assign(work.count, 0.0f);
+// A point of a batch, and what its tasks have brought so far.
+struct Served {
+    std::uint32_t point = 0;
+    BakeRays work;
+    std::vector<Estimate> estimates;  // by task
+};
+
+// Room for tracing the rays of a batch of points together.
+struct Batch {
+    std::vector<Ray> rays;
+    std::vector<int> lights;      // of each ray, in a crowd
+    std::vector<Rgb> factors;     // what is left of each ray's light
+    std::vector<float> arriving;  // luminance by sample
+    std::uint64_t traced = 0;
+};
+
+// Add a round: what arrives along the rays at hand.
+void add_round(const BakeRays& work, std::span<const Rgb> factors, std::vector<float>& arriving, Estimate& estimate) {
+    arriving.assign(work.count, 0.0f);
     V3d sum(0.0), moment(0.0);
     double unoccluded = 0.0;
     const V3f& about = work.places.front().position;
     Flow flow{};
     for (std::size_t i = 0; i < work.rays.size(); ++i) {
         unoccluded += absolute_luminance(work.values[i]);
-        if (work.factors[i] == Rgb(0.0f)) continue;
-        const Rgb value = work.values[i] * work.factors[i];
+        if (factors[i] == Rgb(0.0f)) continue;
+        const Rgb value = work.values[i] * factors[i];
         sum += V3d(value);
         const Place& place = work.places[work.place_of[work.sample_of[i]]];
         moment += V3d(place.position - about) * (double(value.x) + double(value.y) + double(value.z));
         add_flow(flow, value, along_surface(work.rays[i].direction, place.normal));
-        work.arriving[work.sample_of[i]] = luminance(value);
+        arriving[work.sample_of[i]] = luminance(value);
     }
     // Two samples that follow one another lie in neighbouring strata: their difference tells the variance within.
     double squares = 0.0;
     for (std::size_t i = 0; i + 1 < work.count; i += 2) {
-        const double difference = double(work.arriving[i]) - double(work.arriving[i + 1]);
+        const double difference = double(arriving[i]) - double(arriving[i + 1]);
         squares += difference * difference;
     }
     const double n = double(work.count);
@@ -96,49 +84,107 @@ void trace(const RayScene& scene, const LightSampler& lights, const BakeTask& ta
     ++estimate.rounds;
 }
 
-// Trace one point's rays, more rounds where the error asks for it, and write its irradiance. The standard deviation.
-float serve_point(std::uint32_t point, const RayScene& scene, const LightSampler& lights, const RayMaker& maker,
-                  const std::vector<BakeTask>& tasks, const IrradianceOptions& options, Workspace& work,
-                  std::span<Rgb> values, std::span<V3f> moments, std::span<Flow> flows) {
-    std::vector<Estimate> estimates(tasks.size());
-    maker.find_places(point, work);
-    const auto add_round = [&](std::size_t t) {
-        maker.make_rays(point, tasks[t], std::uint32_t(estimates[t].rounds), work);
-        trace(scene, lights, tasks[t], work, estimates[t]);
-    };
-    for (std::size_t t = 0; t < tasks.size(); ++t) add_round(t);
+// What a bake asks and answers with; its parts must outlive it.
+class Bake {
+  public:
+    Bake(const RayScene& scene, const LightSampler& lights, const RayMaker& maker, const std::vector<BakeTask>& tasks,
+         const IrradianceOptions& options, Irradiance& result)
+        : scene_(scene), lights_(lights), maker_(maker), tasks_(tasks), options_(options), result_(result) {}
+
+    // Trace the rays of some points, more rounds where the error asks for it, and write their irradiance.
+    void serve(std::span<Served> points, Batch& batch) const {
+        std::vector<Served*> asking;
+        for (Served& served : points) {
+            served.estimates.assign(tasks_.size(), Estimate());
+            maker_.find_places(served.point, served.work);
+            asking.push_back(&served);
+        }
+        for (std::size_t t = 0; t < tasks_.size(); ++t) trace(asking, t, batch);
+        for (int round = 1; options_.error > 0.0f && round < options_.max_rounds && !asking.empty(); ++round) {
+            std::vector<std::vector<Served*>> wanting(tasks_.size());
+            for (Served* served : asking) {
+                const double allowed = allowed_variance(*served);
+                for (std::size_t t = 0; t < tasks_.size(); ++t) {
+                    const double scale = double(tasks_[t].multiplier) * double(tasks_[t].multiplier);
+                    if (scale * served->estimates[t].mean_variance() > allowed) wanting[t].push_back(served);
+                }
+            }
+            asking.clear();
+            for (std::size_t t = 0; t < tasks_.size(); ++t) {
+                trace(wanting[t], t, batch);
+                asking.insert(asking.end(), wanting[t].begin(), wanting[t].end());
+            }
+            std::sort(asking.begin(), asking.end());
+            asking.erase(std::unique(asking.begin(), asking.end()), asking.end());
+        }
+        for (const Served& served : points) write(served);
+    }
+
+  private:
+    // Trace a round's rays of a task.
+    void trace(std::span<Served* const> points, std::size_t t, Batch& batch) const {
+        const BakeTask& task = tasks_[t];
+        batch.rays.clear(), batch.lights.clear();
+        for (Served* served : points) {
+            BakeRays& work = served->work;
+            maker_.make_rays(served->point, task, std::uint32_t(served->estimates[t].rounds), work);
+            batch.rays.insert(batch.rays.end(), work.rays.begin(), work.rays.end());
+            batch.lights.insert(batch.lights.end(), work.lights.begin(), work.lights.end());
+        }
+        batch.factors.resize(batch.rays.size());
+        if (task.light < 0) {
+            shadow_factors(scene_, lights_, batch.lights, batch.rays, batch.factors);
+        } else {
+            shadow_factors(scene_, lights_, task.light, batch.rays, batch.factors);
+        }
+        batch.traced += batch.rays.size();
+        std::span<const Rgb> factors(batch.factors);
+        for (Served* served : points) {
+            const std::size_t count = served->work.rays.size();
+            add_round(served->work, factors.first(count), batch.arriving, served->estimates[t]);
+            factors = factors.subspan(count);
+        }
+    }
+
     // Each light has an equal part of the variance that is allowed, so that twins take the same number of rounds.
-    for (int round = 1; options.error > 0.0f && round < options.max_rounds; ++round) {
+    double allowed_variance(const Served& served) const {
         double arriving = 0.0, unoccluded = 0.0;
-        for (std::size_t t = 0; t < tasks.size(); ++t) {
-            const double scale = std::abs(double(tasks[t].multiplier));
-            arriving += scale * std::abs(double(luminance(estimates[t].mean())));
-            unoccluded += scale * estimates[t].unoccluded / estimates[t].rounds;
+        for (std::size_t t = 0; t < tasks_.size(); ++t) {
+            const double scale = std::abs(double(tasks_[t].multiplier));
+            arriving += scale * std::abs(double(luminance(served.estimates[t].mean())));
+            unoccluded += scale * served.estimates[t].unoccluded / served.estimates[t].rounds;
         }
-        const double allowed = double(options.error) * std::max(arriving, 0.1 * unoccluded);
-        bool is_done = true;
-        for (std::size_t t = 0; t < tasks.size(); ++t) {
-            const double scale = double(tasks[t].multiplier) * double(tasks[t].multiplier);
-            if (scale * estimates[t].mean_variance() <= allowed * allowed / double(tasks.size())) continue;
-            add_round(t);
-            is_done = false;
-        }
-        if (is_done) break;
+        const double allowed = double(options_.error) * std::max(arriving, 0.1 * unoccluded);
+        return allowed * allowed / double(tasks_.size());
     }
-    double variance = 0.0;
-    for (std::size_t t = 0; t < tasks.size(); ++t) {
-        values[tasks[t].group] += estimates[t].mean() * tasks[t].multiplier;
-        if (!moments.empty()) {
-            moments[tasks[t].group] += V3f(estimates[t].moment * (double(tasks[t].multiplier) / estimates[t].rounds));
+
+    void write(const Served& served) const {
+        const std::size_t row = std::size_t(served.point) * result_.groups;
+        double variance = 0.0;
+        for (std::size_t t = 0; t < tasks_.size(); ++t) {
+            const BakeTask& task = tasks_[t];
+            const Estimate& estimate = served.estimates[t];
+            const std::size_t to = row + task.group;
+            const float scale = task.multiplier / float(estimate.rounds);
+            result_.values[to] += estimate.mean() * task.multiplier;
+            if (!result_.moments.empty()) {
+                result_.moments[to] += V3f(estimate.moment * (double(task.multiplier) / estimate.rounds));
+            }
+            for (std::size_t c = 0; c < 3 && !result_.flows.empty(); ++c) {
+                result_.flows[to][c] += estimate.flow[c] * scale;
+            }
+            variance += double(task.multiplier) * double(task.multiplier) * estimate.mean_variance();
         }
-        const float scale = tasks[t].multiplier / float(estimates[t].rounds);
-        for (std::size_t c = 0; c < 3 && !flows.empty(); ++c) {
-            flows[tasks[t].group][c] += estimates[t].flow[c] * scale;
-        }
-        variance += double(tasks[t].multiplier) * double(tasks[t].multiplier) * estimates[t].mean_variance();
+        result_.errors[served.point] = static_cast<float>(std::sqrt(variance));
     }
-    return static_cast<float>(std::sqrt(variance));
-}
+
+    const RayScene& scene_;
+    const LightSampler& lights_;
+    const RayMaker& maker_;
+    const std::vector<BakeTask>& tasks_;
+    const IrradianceOptions& options_;
+    Irradiance& result_;
+};
 
 void check_bake(const PointSet& points, const IrradianceOptions& options) {
     if (options.samples < 1 || options.samples > (1 << 20)) {
@@ -191,22 +237,19 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
 
     const EntryTable entry(transmittance);
     const RayMaker maker(points, lights, entry, options);
-    const std::vector<std::uint32_t> order = spatial_order(points.positions);
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
+    const Bake bake(scene, lights, maker, tasks, options, result);
+    const std::size_t samples = std::size_t(options.samples);
+    const std::size_t chunk = std::clamp<std::size_t>(kRaysPerBatch / samples, 1, kMostPointsPerBatch);
     std::atomic<std::uint64_t> rays{0}, dropped{0};
     std::atomic<std::size_t> done{0};
-    parallel_for(points.size(), kPointsPerChunk, [&](std::size_t begin, std::size_t end) {
-        Workspace work;
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::size_t row = std::size_t(order[i]) * groups.size();
-            std::span<V3f> moments;
-            if (!result.moments.empty()) moments = std::span(result.moments).subspan(row, groups.size());
-            std::span<Flow> flows;
-            if (!result.flows.empty()) flows = std::span(result.flows).subspan(row, groups.size());
-            result.errors[order[i]] = serve_point(order[i], scene, lights, maker, tasks, options, work,
-                                                  std::span(result.values).subspan(row, groups.size()), moments, flows);
-        }
-        rays += work.traced;
-        dropped += work.dropped;
+    parallel_for(points.size(), chunk, [&](std::size_t begin, std::size_t end) {
+        std::vector<Served> served(end - begin);
+        for (std::size_t i = begin; i < end; ++i) served[i - begin].point = order[i];
+        Batch batch;
+        bake.serve(served, batch);
+        rays += batch.traced;
+        for (const Served& one : served) dropped += one.work.dropped;
         const std::size_t finished = done += end - begin;
         if (progress) progress->update("bake", double(finished) / double(points.size()));
     });
@@ -222,7 +265,7 @@ std::vector<Ray> shadow_rays(const PointSet& points, const LightSampler& lights,
     std::vector<Ray> rays;
     BakeRays work;
     const std::vector<BakeTask> tasks = bake_tasks(lights, light_groups(lights.lights()), options.component);
-    for (const std::uint32_t point : spatial_order(points.positions)) {
+    for (const std::uint32_t point : morton_order(points.positions)) {
         maker.find_places(point, work);
         for (const BakeTask& task : tasks) {
             maker.make_rays(point, task, 0, work);

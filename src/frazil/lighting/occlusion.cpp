@@ -4,16 +4,15 @@
 #include <array>
 
 #include "frazil/base/error.h"
-#include "frazil/base/morton.h"
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/radix_sort.h"
 #include "frazil/base/sampler.h"
 #include "frazil/base/trigonometry.h"
 
 namespace frazil {
 namespace {
 
-constexpr std::size_t kPointsPerChunk = 64;
+constexpr std::size_t kPointsPerChunk = 64, kRaysPerBatch = 4096;
 constexpr std::size_t kLeafSize = 4;
 
 void check(const PointSet& points, float distance) {
@@ -87,14 +86,7 @@ class Raster {
 // Disks by position: a binary tree over the Morton order, its nodes in pre-order.
 class DiskTree {
   public:
-    explicit DiskTree(const PointSet& points) : points_(points), order_(points.size()) {
-        Box3f box;
-        for (const V3f& p : points.positions) box.extendBy(p);
-        const MortonGrid grid(box);
-        std::vector<KeyedIndex> keys(points.size()), scratch;
-        for (std::uint32_t i = 0; i < keys.size(); ++i) keys[i] = {grid.code(points.positions[i]), i};
-        radix_sort(keys, 3 * kMortonBits, scratch);
-        for (std::size_t i = 0; i < keys.size(); ++i) order_[i] = keys[i].index;
+    explicit DiskTree(const PointSet& points) : points_(points), order_(morton_order(points.positions)) {
         if (!order_.empty()) build(0, order_.size());
     }
 
@@ -210,29 +202,35 @@ Occlusion bake_occlusion(const PointSet& points, const RayScene& scene, const Oc
     }
     Occlusion result{std::vector<float>(points.size(), 1.0f), points.normals};
     const ScrambledNet net(options.samples);
-    parallel_for(points.size(), kPointsPerChunk, [&](std::size_t begin, std::size_t end) {
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
+    // As many points at a time as keep their rays in the cache.
+    const std::size_t batch = std::clamp<std::size_t>(kRaysPerBatch / net.size(), 1, kPointsPerChunk);
+    parallel_for(points.size(), batch, [&](std::size_t begin, std::size_t end) {
         std::vector<V2f> u(net.size());
-        std::vector<Ray> rays(net.size());
-        std::vector<std::uint8_t> is_hidden(net.size());
-        for (std::size_t i = begin; i < end; ++i) {
+        std::vector<Ray> rays;
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::uint32_t i = order[k];
             const V3f& normal = points.normals[i];
             const V3f origin = offset_origin(points.positions[i], normal);
             const auto [s, t] = tangent_frame(normal);
-            net.draw(options.seed, std::uint32_t(i), u);
-            for (std::size_t k = 0; k < u.size(); ++k) {
-                const V3f local = cosine_hemisphere(u[k]);
-                rays[k] = {origin, s * local.x + t * local.y + normal * local.z, 0.0f, options.distance};
+            net.draw(options.seed, i, u);
+            for (const V2f& sample : u) {
+                const V3f local = cosine_hemisphere(sample);
+                rays.push_back({origin, s * local.x + t * local.y + normal * local.z, 0.0f, options.distance});
             }
-            scene.are_occluded(rays, is_hidden);
+        }
+        std::vector<std::uint8_t> is_hidden(rays.size());
+        scene.are_occluded(rays, is_hidden);
+        for (std::size_t k = begin, ray = 0; k < end; ++k) {
             int open = 0;
             V3f mean(0.0f);
-            for (std::size_t k = 0; k < rays.size(); ++k) {
-                if (is_hidden[k]) continue;
+            for (std::size_t sample = 0; sample < net.size(); ++sample, ++ray) {
+                if (is_hidden[ray]) continue;
                 ++open;
-                mean += rays[k].direction;
+                mean += rays[ray].direction;
             }
-            result.openness[i] = float(open) / float(rays.size());
-            if (mean.length2() > 0.0f) result.bent_normals[i] = mean.normalized();
+            result.openness[order[k]] = float(open) / float(net.size());
+            if (mean.length2() > 0.0f) result.bent_normals[order[k]] = mean.normalized();
         }
     });
     return result;

@@ -5,9 +5,8 @@
 #include <span>
 
 #include "frazil/base/error.h"
-#include "frazil/base/morton.h"
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/radix_sort.h"
 #include "frazil/base/random.h"
 #include "frazil/points/point_lookup.h"
 
@@ -175,17 +174,12 @@ std::vector<Piece> coarse_pieces(const Mesh& mesh, double longest) {
                });
     }
     // Along a Morton curve, so that a chunk has few cells.
-    Box3f box;
-    for (const V3f& p : mesh.positions) box.extendBy(p);
-    const MortonGrid grid(box);
-    std::vector<KeyedIndex> keys(pieces.size()), scratch;
-    for (std::uint32_t i = 0; i < pieces.size(); ++i) {
-        const auto& uv = pieces[i].uv;
-        keys[i] = {grid.code(V3f(corners_of(mesh, pieces[i].triangle).at((uv[0] + uv[1] + uv[2]) / 3.0f))), i};
+    std::vector<V3f> middles;
+    for (const auto& [triangle, uv] : pieces) {
+        middles.emplace_back(corners_of(mesh, triangle).at((uv[0] + uv[1] + uv[2]) / 3.0f));
     }
-    radix_sort(keys, 3 * kMortonBits, scratch);
-    std::vector<Piece> sorted(pieces.size());
-    for (std::size_t i = 0; i < keys.size(); ++i) sorted[i] = pieces[keys[i].index];
+    std::vector<Piece> sorted;
+    for (const std::uint32_t i : morton_order(middles)) sorted.push_back(pieces[i]);
     return sorted;
 }
 

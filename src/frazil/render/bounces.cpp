@@ -52,23 +52,40 @@ Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<R
     return {std::move(irradiance), std::move(gathered.exitance)};
 }
 
-// What a boundary reflects towards wo per unit of irradiance that enters, where light comes evenly from all around: with what
+// What a boundary reflects at a cosine per unit of irradiance that enters, where light comes evenly from all around: with what
 // leaves the core it makes a white furnace of radiance one. Other light is reflected as if it were spread so.
-float mirrored_radiance(const Body& body, const Surface& surface, const V3f& wo) {
-    const float roughness = surface.covering.roughness;
-    return (1.0f - body.transmittance(surface.normal.dot(wo), roughness)) * kInvPi /
-           body.transmittance_average(roughness);
+float mirrored_radiance(const Body& body, float cosine, float roughness) {
+    return (1.0f - body.transmittance(cosine, roughness)) * kInvPi / body.transmittance_average(roughness);
+}
+
+// What a point of ice shows of its surface.
+struct PointLook {
+    Rgb radiance_per_exitance;  // inside
+    float roughness;
+    float entering;  // of the light, beside what overlays take
+};
+
+std::vector<PointLook> looks_of(const SurfaceResolver& resolver, const Body& body, std::uint32_t object,
+                                const PointSet& in_world) {
+    std::vector<PointLook> looks(in_world.size());
+    resolver.look_at_points(object, in_world, [&](std::size_t k, const Surface& surface) {
+        looks[k] = {body.inner_radiance_per_exitance(surface), surface.covering.roughness,
+                    1.0f - surface.covering.scattered};
+    });
+    return looks;
 }
 
 // Finds the points of ice that rays meet.
 class IceFinder {
   public:
+    // `looks` are those of each object's own points.
     IceFinder(const std::vector<std::unique_ptr<Body>>& bodies, const TranslucencySets& sets,
-              const SurfaceResolver& resolver)
-        : bodies_(bodies), sets_(sets), resolver_(resolver), lookups_(bodies.size()) {
+              const SurfaceResolver& resolver, const std::vector<std::vector<PointLook>>& looks)
+        : bodies_(bodies), sets_(sets), resolver_(resolver), lookups_(bodies.size()), looks_(bodies.size()) {
         for (std::size_t i = 0; i < bodies.size(); ++i) {
             if (bodies[i] && sets.is_leader(i) && sets.points(i).size() > 0) {
                 lookups_[i] = sets.points(i).cloud().lookup();
+                looks_[i] = sets.united(i, 1, [&](std::size_t k) { return &looks[k]; });
             }
         }
     }
@@ -82,11 +99,12 @@ class IceFinder {
             const std::uint32_t point = lookups_[leader]->nearest(hit.position * points.to_cloud(),
                                                                   points.into_cloud(hit.surface.geometric_normal));
             if (point == PointLookup::kNone) continue;
-            const Surface surface = resolver_.resolve(hit.surface, hit.direction);
+            const float cosine = -resolver_.glimpse(hit.surface, hit.direction).normal.dot(hit.direction);
             const Body& body = *bodies_[hit.surface.placement];
+            const PointLook& look = looks_[leader][point];
             found.push_back({hit.point, static_cast<std::uint32_t>(leader), point,
-                             body.radiance_per_exitance(surface, -hit.direction) * hit.weight,
-                             hit.weight * mirrored_radiance(body, surface, -hit.direction), hit.along});
+                             look.radiance_per_exitance * hit.weight * body.enters(cosine, look.roughness),
+                             hit.weight * mirrored_radiance(body, cosine, look.roughness), hit.along});
         }
         found.shrink_to_fit();
         return found;
@@ -97,6 +115,7 @@ class IceFinder {
     const TranslucencySets& sets_;
     const SurfaceResolver& resolver_;
     std::vector<std::shared_ptr<const PointLookup>> lookups_;  // by leader
+    std::vector<std::vector<PointLook>> looks_;                // of its set's points
 };
 
 // Light along all sightlines of an object: what the points that are seen send.
@@ -192,14 +211,19 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     // What each point sees: ice, along lines that all bounces take, and what straight light makes of other surfaces.
     const std::size_t wanted = static_cast<std::size_t>(std::max(1, options.bake_samples / 4));
     const int rays = static_cast<int>(std::clamp<std::size_t>(kMostSightlines / points, 1, wanted));
-    const IceFinder ice(bodies, sets, resolver);
-    std::vector<Sightlines> sightlines(lit.size());
-    std::vector<Irradiance> last(lit.size());  // what the last bounce brought; at first what surfaces reflect
+    std::vector<std::vector<PointLook>> looks(lit.size());
     std::vector<std::vector<float>> entering(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
+        looks[i] = looks_of(resolver, *bodies[i], static_cast<std::uint32_t>(i), lit[i].points.in_world());
+        for (const PointLook& look : looks[i]) entering[i].push_back(look.entering);
+    }
+    const IceFinder ice(bodies, sets, resolver, looks);
+    std::vector<Sightlines> sightlines(lit.size());
+    std::vector<Irradiance> last(lit.size());  // what the last bounce brought; at first what surfaces reflect
+    for (std::size_t i = 0; i < lit.size(); ++i) {
+        if (lit[i].points.size() == 0) continue;
         const PointSet in_world = lit[i].points.in_world();
-        entering[i] = resolver.entering(static_cast<std::uint32_t>(i), in_world);
         IrradianceOptions bake_options{rays, options.seed};
         Mesh mesh;
         const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
@@ -211,10 +235,9 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
         bake_options.with_flows = true;
         last[i] = bake_bounce(
             in_world, ray_scene, groups,
-            [&](std::span<const BounceHit> hits, std::span<Rgb> radiance) {
-                if (hits.empty()) return;
-                sightlines[i][hits.front().point / kPointsPerBounceBatch] = ice.find(hits);
-                reflected(hits, radiance);
+            [&](std::size_t batch, std::span<const BounceHit> hits, std::span<Rgb> radiance) {
+                sightlines[i][batch] = ice.find(hits);
+                reflected(batch, hits, radiance);
             },
             [&](float cosine) { return bodies[i]->enters(cosine, bodies[i]->material->roughness.value); }, bake_options,
             progress);

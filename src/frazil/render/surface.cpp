@@ -167,28 +167,34 @@ std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, cons
     const auto& ice = std::get<IceMaterial>(scene_.materials[scene_.objects[object].material].model);
     const std::size_t overlays = ice.overlays.size();
     std::vector<float> result(points.size() * overlays);
-    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
-        const std::vector<CoveringSlope> slopes = covering_slopes(ice.overlays, ice.age, at, texture_at);
-        const float scattered = eval_overlays(ice.overlays, ice.age, 0.0f, at, texture_at, false).scattered;
+    look_at_points(object, points, [&](std::size_t k, const Surface& surface) {
+        const std::vector<CoveringSlope> of_overlays = slopes(surface);
+        const float scattered = surface.covering.scattered;
         for (std::size_t o = 0; o < overlays; ++o) {
-            result[k * overlays + o] = scattered < 1.0f ? slopes[o].scattered / (1.0f - scattered) : 0.0f;
+            result[k * overlays + o] = scattered < 1.0f ? of_overlays[o].scattered / (1.0f - scattered) : 0.0f;
         }
     });
     return result;
 }
 
-template <class Visit>
-void SurfaceResolver::for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const {
+void SurfaceResolver::look_at_points(std::uint32_t object, const PointSet& points,
+                                     const std::function<void(std::size_t, const Surface&)>& visit) const {
+    const Material& material = scene_.materials[scene_.objects[object].material];
+    const auto& ice = std::get<IceMaterial>(material.model);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto triangle = static_cast<std::uint32_t>(points.triangles[k]);
-            TexturePoint at =
-                texture_point(object, triangle, points.barycentrics[k], points.positions[k], points.normals[k]);
-            // A point stands for a disc of its area.
+            Surface surface;
+            surface.object = object;
+            surface.material = &material;
+            TexturePoint& at = surface.texture_point;
+            at = texture_point(object, triangle, points.barycentrics[k], points.positions[k], points.normals[k]);
             const float footprint = std::sqrt(points.areas[k] * kInvPi);
             std::tie(at.long_axis, at.short_axis) = tangent_frame(at.normal);
             at.long_axis *= footprint, at.short_axis *= footprint;
-            visit(k, PatternPoint{at.position, at.normal, footprint}, at);
+            surface.place = {at.position, at.normal, footprint};
+            surface.covering = covering(ice, at, footprint, false);
+            visit(k, surface);
         }
     });
 }
@@ -197,9 +203,8 @@ std::vector<float> SurfaceResolver::entering(std::uint32_t object, const PointSe
     const auto* ice = std::get_if<IceMaterial>(&scene_.materials[scene_.objects[object].material].model);
     if (!ice || ice->overlays.empty()) return {};
     std::vector<float> result(points.size());
-    for_points(object, points, [&](std::size_t k, const PatternPoint& at, const TexturePoint& texture_at) {
-        result[k] = 1.0f - eval_overlays(ice->overlays, ice->age, 0.0f, at, texture_at, false).scattered;
-    });
+    look_at_points(object, points,
+                   [&](std::size_t k, const Surface& surface) { result[k] = 1.0f - surface.covering.scattered; });
     return result;
 }
 

@@ -8,6 +8,7 @@
 // Units: metres, world space.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "frazil/geometry/ray_scene.h"
@@ -54,6 +55,11 @@ class SurfaceResolver {
     // Where a hit lies, in world space: the position that resolve gives it.
     V3f position(const Hit& hit) const;
 
+    // What each point of an object of ice shows over the disc of its area: texture coordinates, patterns' place and
+    // covering; the rest is left out. visit(point, surface) comes from several threads at once.
+    void look_at_points(std::uint32_t object, const PointSet& points,
+                        const std::function<void(std::size_t point, const Surface& surface)>& visit) const;
+
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
     std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
 
@@ -78,8 +84,6 @@ class SurfaceResolver {
     // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
     TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,
                                const V3f& normal) const;
-    template <class Visit>
-    void for_points(std::uint32_t object, const PointSet& points, const Visit& visit) const;
 
     const Scene& scene_;
     std::vector<Frames> frames_;
