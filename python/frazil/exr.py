@@ -8,22 +8,33 @@ Not: tiles, mip-maps, deep data; previews and other formats (see image.py).
 
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
-from .image import HALF_MAX, check_written, one_line, opened
+from .image import HALF_MAX, one_line, opened
 from .replacing import replacing
 
 __all__ = ["COMPRESSIONS", "channel_names", "read_exr", "read_header", "write_exr"]
 
 # Attributes that writing sets itself, whatever the picture that was read had.
-_OWN_ATTRIBUTES = ("compression", "name", "chunkCount", "dataWindow", "displayWindow")
+_WINDOWS = ("dataWindow", "displayWindow")
+_OWN_ATTRIBUTES = ("compression", "name", "type", "chunkCount", *_WINDOWS)
+# What OpenEXR calls attributes that OpenImageIO, which reads them, has names of its own for.
+_STANDARD_NAMES = {
+    "PixelAspectRatio": "pixelAspectRatio",
+    "DateTime": "capDate",
+    "ImageDescription": "comments",
+    "Copyright": "owner",
+    "ExposureTime": "expTime",
+    "FNumber": "aperture",
+    "worldtocamera": "worldToCamera",
+    "worldtoscreen": "worldToNDC",
+}
 LOSSY = ("pxr24", "b44", "b44a", "dwaa", "dwab")
 COMPRESSIONS = ("none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
-# Rows written at a time: a multiple of every compression's block; few, so that they stay in the cache.
-STRIP, TALL_STRIP = 32, 256
+STRIP = 256  # rows read at a time where channels are few: a multiple of every compression's block
 
 
 def channel_names(layer: str, letters: str) -> list[str]:
@@ -33,17 +44,6 @@ def channel_names(layer: str, letters: str) -> list[str]:
     if len(letters) == 1:
         return [layer]
     return [f"{layer}.{letter}" for letter in letters]
-
-
-@dataclass
-class _Part:
-    """What one part of the file holds: channels by name, (H, W) each, and their formats."""
-
-    name: str
-    channels: list[str]
-    arrays: list[np.ndarray]
-    formats: list[str]
-    compression: str
 
 
 def write_exr(
@@ -92,7 +92,7 @@ def write_exr(
     OSError
         Where the file cannot be written; what was there before is untouched.
     """
-    import OpenImageIO as oiio
+    import OpenEXR
 
     if compression not in COMPRESSIONS:
         raise ValueError(f"{path}: compression must be one of {', '.join(COMPRESSIONS)}, got {compression!r}.")
@@ -111,76 +111,62 @@ def write_exr(
             "--multipart, where every layer has its own."
         )
     promoted = [name for name in half_layers if name in layers and _exceeds_half(layers[name])]
-    parts = [
-        _Part(
-            name,
-            names := channel_names(name, letters[name]),
-            [layers[name][:, :, i] for i in range(len(names))],
-            ["half" if name in half_layers and name not in promoted else "float"] * len(names),
-            "zips" if name in exact and compression in LOSSY else compression,
-        )
-        for name in layers
-    ]
-    if not multipart:
-        joined = _Part("", [], [], [], compression)
-        for part in parts:
-            joined.channels += part.channels
-            joined.arrays += part.arrays
-            joined.formats += part.formats
-        parts = [joined]
-    specs = [_spec_of(oiio, part, metadata or {}, is_first=i == 0) for i, part in enumerate(parts)]
+    halves = set(half_layers) - set(promoted)
+    attributes = _header_of(metadata or {}, width, height)
+    with ThreadPoolExecutor(threads := os.cpu_count() or 1) as pool:
+        kept = pool.map(lambda name: _channels_of(name, layers[name], letters[name], name in halves), layers)
+        channels = dict(zip(layers, kept, strict=True))
+    if multipart:
+        parts = []
+        for name in layers:
+            # A later part repeats only what belongs to it.
+            own = {
+                key: value
+                for key, value in attributes.items()
+                if not parts or key in _WINDOWS or (key.startswith("cryptomatte/") and name.startswith("crypto"))
+            }
+            own["compression"] = _compression("zips" if name in exact and compression in LOSSY else compression)
+            parts.append(OpenEXR.Part(own | {"type": OpenEXR.scanlineimage}, channels[name], name))
+    else:
+        attributes |= {"compression": _compression(compression), "type": OpenEXR.scanlineimage}
+        joined = {channel: array for own in channels.values() for channel, array in own.items()}
+        parts = [OpenEXR.Part(attributes, joined, "")]
 
+    OpenEXR.set_global_thread_count(threads)
     with replacing(path) as temporary:
-        output = oiio.ImageOutput.create("openexr")
         try:
-            opened = output.open(str(temporary), tuple(specs)) if multipart else output.open(str(temporary), specs[0])
-            check_written(opened, output)
-            for i, (part, spec) in enumerate(zip(parts, specs, strict=True)):
-                if i > 0:
-                    check_written(output.open(str(temporary), spec, "AppendSubimage"), output)
-                for top, strip in _strips(part):
-                    check_written(output.write_scanlines(spec.y + top, spec.y + top + len(strip), 0, strip), output)
-        finally:
-            closed = output.close()
-        check_written(closed, output)
+            OpenEXR.File(parts).write(str(temporary))
+        except RuntimeError as error:
+            raise OSError(one_line(str(error))) from error
     return promoted
 
 
-def _strips(part: _Part) -> Iterator[tuple[int, np.ndarray]]:
-    """The rows of a part, (rows, W, channels) at a time, and the first row of each."""
-    height, width = part.arrays[0].shape
-    rows = TALL_STRIP if part.compression == "dwab" else STRIP
-    # Half arrays for half channels are stored as they are.
-    is_half = set(part.formats) == {"half"} and all(array.dtype == np.float16 for array in part.arrays)
-    # Channel after channel, then turned over: an eighth of the time that interleaving them one by one takes, as each
-    # goes far through memory. The odd length keeps the turned array's rows from falling on the same lines of the cache.
-    planar = np.empty((len(part.arrays), rows * width + 32), np.float16 if is_half else np.float32)
-    for top in range(0, height, rows):
-        count = min(rows, height - top)
-        for channel, array in zip(planar, part.arrays, strict=True):
-            channel[: count * width].reshape(count, width)[:] = array[top : top + count]
-        yield top, np.ascontiguousarray(planar[:, : count * width].T).reshape(count, width, -1)
+def _compression(name: str) -> Any:
+    import OpenEXR
+
+    return getattr(OpenEXR, f"{name.upper()}_COMPRESSION" if name != "none" else "NO_COMPRESSION")
 
 
-def _spec_of(oiio: Any, part: _Part, metadata: Mapping[str, Any], is_first: bool) -> Any:
-    height, width = part.arrays[0].shape
-    spec = oiio.ImageSpec(width, height, len(part.channels), part.formats[0])
-    spec.channelnames = tuple(part.channels)
-    if len(set(part.formats)) > 1:  # OpenImageIO takes no heed of channelformats that are all the same
-        spec.channelformats = tuple(part.formats)
-    spec.attribute("compression", part.compression)
-    if part.name:
-        spec.attribute("oiio:subimagename", part.name)
-    if "dataWindow" in metadata:
-        spec.x, spec.y = (int(v) for v in metadata["dataWindow"][:2])
-    if "displayWindow" in metadata:
-        spec.full_x, spec.full_y, spec.full_width, spec.full_height = (int(v) for v in metadata["displayWindow"])
+def _channels_of(layer: str, array: np.ndarray, letters: str, is_half: bool) -> dict[str, np.ndarray]:
+    """The channels of a layer by name, each in memory of its own as it is stored."""
+    kind = np.float16 if is_half else np.float32
+    names = channel_names(layer, letters)
+    return {name: np.ascontiguousarray(array[:, :, i], dtype=kind) for i, name in enumerate(names)}
+
+
+def _header_of(metadata: Mapping[str, Any], width: int, height: int) -> dict[str, Any]:
+    """A header's attributes, as OpenEXR has them."""
+    data = [int(v) for v in metadata.get("dataWindow", (0, 0, width, height))][:2] + [width, height]
+    display = [int(v) for v in metadata.get("displayWindow", data)]
+    header = {
+        name: (np.array([x, y], np.int32), np.array([x + w - 1, y + h - 1], np.int32))
+        for name, (x, y, w, h) in zip(_WINDOWS, (data, display), strict=True)
+    }
     for key, value in metadata.items():
-        # A later part repeats only what belongs to it.
-        is_wanted = is_first or (key.startswith("cryptomatte/") and part.name.startswith("crypto"))
-        if is_wanted and key not in _OWN_ATTRIBUTES and not key.startswith(("oiio:", "openexr:")):
-            _set_attribute(oiio, spec, key, value)
-    return spec
+        if key not in _OWN_ATTRIBUTES and not key.startswith(("oiio:", "openexr:")):
+            name = _STANDARD_NAMES.get(key, key)
+            header[name] = _attribute_of(name, value)
+    return header
 
 
 def read_exr(
@@ -275,7 +261,7 @@ def _read_part(
     kind = (
         "half" if all(array.dtype == np.float16 for array in arrays.values()) and set(formats) == {"half"} else "float"
     )
-    rows = max(16, TALL_STRIP * 16 // max(spec.nchannels, 16) // 16 * 16)
+    rows = max(16, STRIP * 16 // max(spec.nchannels, 16) // 16 * 16)
     for top in range(0, spec.height, rows):
         bottom = min(spec.height, top + rows)
         strip = source.read_scanlines(spec.y + top, spec.y + bottom, 0, 0, spec.nchannels, kind)
@@ -335,16 +321,17 @@ def _exceeds_half(array: np.ndarray) -> bool:
     return bool(np.any((magnitude > HALF_MAX) & np.isfinite(magnitude)))
 
 
-def _set_attribute(oiio: Any, spec: Any, key: str, value: Any) -> None:
+def _attribute_of(name: str, value: Any) -> Any:
+    """What OpenEXR makes an attribute of the right type of."""
     if isinstance(value, bool):
-        value = int(value)
+        return int(value)
     if isinstance(value, int) and not -(2**31) <= value < 2**31:
-        value = str(value)  # OpenEXR's integers have 32 bits with sign
+        return str(value)  # OpenEXR's integers have 32 bits with sign
     if isinstance(value, str | int | float):
-        spec.attribute(key, value)
-        return
+        return value
     values = np.asarray(value, dtype=np.float32).ravel()
     if values.size == 16:
-        spec.attribute(key, oiio.TypeMatrix44, tuple(values.tolist()))
-    else:
-        spec.attribute(key, oiio.TypeDesc(f"float[{values.size}]"), tuple(values.tolist()))
+        return values.reshape(4, 4)
+    if name == "chromaticities":
+        return tuple(values.tolist())
+    return values if name == "screenWindowCenter" else values.tolist()

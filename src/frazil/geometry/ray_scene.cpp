@@ -148,15 +148,16 @@ struct FilteredContext {
 #endif
     }
 
-    // Single rays alone: N is 1.
     static void reject_unmasked(const RTCFilterFunctionNArguments* arguments) {
         const auto* self = reinterpret_cast<const FilteredContext*>(arguments->context);
-        if (arguments->valid[0] != -1) return;
-        const unsigned instance = RTCHitN_instID(arguments->hit, 1, 0, 0);
-        const unsigned geometry = RTCHitN_geomID(arguments->hit, 1, 0);
-        const std::uint32_t placement =
-            (*self->placement_of_geometry)[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
-        if (placement >= self->mask->size() || !(*self->mask)[placement]) arguments->valid[0] = 0;
+        for (unsigned i = 0; i < arguments->N; ++i) {
+            if (arguments->valid[i] != -1) continue;
+            const unsigned instance = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
+            const unsigned geometry = RTCHitN_geomID(arguments->hit, arguments->N, i);
+            const std::uint32_t placement =
+                (*self->placement_of_geometry)[instance != RTC_INVALID_GEOMETRY_ID ? instance : geometry];
+            if (placement >= self->mask->size() || !(*self->mask)[placement]) arguments->valid[i] = 0;
+        }
     }
 };
 
@@ -305,13 +306,18 @@ void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> o
     });
 }
 
-void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
+void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits, PlacementMask mask) const {
+    FilteredContext context(impl_->placement_of_geometry, mask);
 #if FRAZIL_EMBREE_MAJOR >= 4
     RTCIntersectArguments arguments;
     rtcInitIntersectArguments(&arguments);
+    if (mask) {
+        arguments.context = &context.embree;
+        arguments.filter = &FilteredContext::reject_unmasked;
+        arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    }
 #else
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+    if (!mask) context.embree.filter = nullptr;
 #endif
     for_each_packet(rays, [&](const std::uint32_t* index, std::size_t count) {
         alignas(32) int valid[kPacket];
@@ -324,7 +330,7 @@ void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
 #if FRAZIL_EMBREE_MAJOR >= 4
         rtcIntersect8(valid, impl_->top, &packet, &arguments);
 #else
-        rtcIntersect8(valid, impl_->top, &context, &packet);
+        rtcIntersect8(valid, impl_->top, &context.embree, &packet);
 #endif
         for (std::size_t i = 0; i < count; ++i) {
             if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {

@@ -1,17 +1,11 @@
 #include "frazil/render/chords.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "frazil/base/trigonometry.h"
 
 namespace frazil {
-namespace {
-
-constexpr int kChords = 16;
-
-}  // namespace
-
 ChordFinder::ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask)
     : scene_(scene), shells_(shells), mask_(mask), net_(kChords) {}
 
@@ -20,28 +14,41 @@ void ChordFinder::draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& 
     net_.draw(seed, static_cast<std::uint32_t>(point), u);
 }
 
-bool ChordFinder::find(const PointSet& points, std::size_t point, std::uint32_t seed,
-                       std::vector<Chord>& chords) const {
-    const V3f inward = -points.normals[point], origin = offset_origin(points.positions[point], inward);
-    const auto [s, t] = tangent_frame(inward);
+std::vector<Chord> ChordFinder::find(const PointSet& points, std::span<const std::uint32_t> which,
+                                     std::uint32_t seed) const {
+    std::vector<Chord> chords;
+    std::vector<Ray> rays;
     std::vector<V2f> u;
-    draw(seed, point, u);
-    chords.resize(u.size());
-    bool all = true;
-    for (std::size_t k = 0; k < u.size(); ++k) {
-        const V3f local = cosine_hemisphere(u[k]);
-        chords[k].ray = {origin, s * local.x + t * local.y + inward * local.z};
-        chords[k].cosine = local.z;
-        chords[k].length = way_out(chords[k].ray);
-        all = all && std::isfinite(chords[k].length);
+    for (const std::uint32_t point : which) {
+        const V3f inward = -points.normals[point], origin = offset_origin(points.positions[point], inward);
+        const auto [s, t] = tangent_frame(inward);
+        draw(seed, point, u);
+        for (const V2f& sample : u) {
+            const V3f local = cosine_hemisphere(sample);
+            rays.push_back({origin, s * local.x + t * local.y + inward * local.z});
+            chords.push_back({rays.back(), local.z, 0.0f});
+        }
     }
-    return all || shells_;
+    const std::vector<float> lengths = ways_out(rays);
+    for (std::size_t i = 0; i < chords.size(); ++i) chords[i].length = lengths[i];
+    return chords;
 }
 
-float ChordFinder::way_out(const Ray& ray) const {
-    if (shells_) return shells_->way_through(ray);
-    Hit hit;
-    return scene_.intersect(ray, hit, mask_) ? hit.t : std::numeric_limits<float>::infinity();
+bool ChordFinder::is_closed(std::span<const Chord> chords) const {
+    return shells_ ||
+           std::all_of(chords.begin(), chords.end(), [](const Chord& chord) { return std::isfinite(chord.length); });
+}
+
+std::vector<float> ChordFinder::ways_out(std::span<const Ray> rays) const {
+    std::vector<float> ways;
+    if (shells_) {
+        for (const Ray& ray : rays) ways.push_back(shells_->way_through(ray));
+        return ways;
+    }
+    std::vector<Hit> hits(rays.size());
+    scene_.intersect(rays, hits, mask_);
+    for (const Hit& hit : hits) ways.push_back(hit.t);
+    return ways;
 }
 
 }  // namespace frazil

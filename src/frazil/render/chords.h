@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "frazil/base/sampler.h"
@@ -26,10 +27,14 @@ class ChordFinder {
     // Both, and the scene, must outlive this; they may be null.
     ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask);
 
-    // Chords from a point; false where one of a body by itself finds no other side.
-    bool find(const PointSet& points, std::size_t point, std::uint32_t seed, std::vector<Chord>& chords) const;
-    // How far it is along a ray from inside to where the body ends; infinite where it does not.
-    float way_out(const Ray& ray) const;
+    // Chords from each of some points.
+    static constexpr std::size_t kChords = 16;
+    // Those of which[0], then of which[1] ...: more at a time take less time each.
+    std::vector<Chord> find(const PointSet& points, std::span<const std::uint32_t> which, std::uint32_t seed) const;
+    // Whether chords of a point tell of a closed body: one by itself has another side on all of them.
+    bool is_closed(std::span<const Chord> chords) const;
+    // How far it is along rays from inside to where the body ends; infinite where it does not.
+    std::vector<float> ways_out(std::span<const Ray> rays) const;
     // Quasi-random numbers, one per chord.
     void draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& u) const;
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
 #include "frazil/points/point_lookup.h"
 
@@ -168,20 +169,21 @@ float first_scattering_within(float depth) {
 
 Room room_of(const PointSet& points, const ChordFinder& finder, float sigma_t) {
     Room room{std::vector<float>(points.size(), 1.0f), std::vector<float>(points.size(), 1.0f)};
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
-        std::vector<Chord> chords;
-        for (std::size_t k = begin; k < end; ++k) {
-            finder.find(points, k, kSeed, chords);
+        const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
+        const std::vector<Chord> all = finder.find(points, which, kSeed);
+        for (std::size_t i = 0; i < which.size(); ++i) {
             float inwards = 0.0f, along = 0.0f, cosines = 0.0f, squares = 0.0f;
-            for (const Chord& chord : chords) {
+            for (const Chord& chord : std::span(all).subspan(i * ChordFinder::kChords, ChordFinder::kChords)) {
                 const float square = 1.0f - chord.cosine * chord.cosine;
                 cosines += chord.cosine;
                 squares += square;
                 inwards += chord.cosine * first_scattering_within(0.5f * sigma_t * chord.length);
                 along += square * first_scattering_within(sigma_t * chord.length);
             }
-            room.inwards[k] = inwards / cosines;
-            room.along[k] = along / squares;
+            room.inwards[which[i]] = inwards / cosines;
+            room.along[which[i]] = along / squares;
         }
     });
     return room;

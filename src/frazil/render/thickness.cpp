@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/trigonometry.h"
 #include "frazil/render/chords.h"
@@ -16,10 +17,10 @@ namespace {
 constexpr float kThinnest = 1e-3f;
 constexpr std::uint32_t kSeed = 0x74686963U;
 
-// A place on a chord where light is scattered once.
-struct ScatteringPlace {
+// Light that is scattered once, at a place on a chord.
+struct OnceScattered {
     float way = 0.0f;     // from the chord's beginning, and on from there in any direction to where the body ends
-    float metres = 0.0f;  // that it stands for: 1 / its density
+    float metres = 0.0f;  // of the chord that the place stands for: 1 / its density; 0: there is none
 };
 
 V3f uniform_sphere(const V2f& u) {
@@ -27,9 +28,8 @@ V3f uniform_sphere(const V2f& u) {
     return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
-// Drawn by the free path of one channel in three, cut off at the chord's end.
-ScatteringPlace draw_place(const Chord& chord, const Rgb& sigma_s, const V2f& u, const V2f& u_away,
-                           const ChordFinder& finder) {
+// A depth, as `way`, drawn by the free path of one channel in three, cut off at the chord's end.
+OnceScattered draw_place(const Chord& chord, const Rgb& sigma_s, const V2f& u) {
     const int drawn = std::min(static_cast<int>(3.0f * u.x), 2);
     const auto reach = [&](int c) { return -std::expm1(-sigma_s[c] * chord.length); };
     if (!(reach(drawn) > 0.0f)) return {};
@@ -38,8 +38,33 @@ ScatteringPlace draw_place(const Chord& chord, const Rgb& sigma_s, const V2f& u,
     for (int c = 0; c < 3; ++c) {
         if (reach(c) > 0.0f) density += sigma_s[c] * std::exp(-sigma_s[c] * depth) / reach(c) / 3.0f;
     }
-    const float on = finder.way_out({chord.ray.origin + chord.ray.direction * depth, uniform_sphere(u_away)});
-    return {depth + on, 1.0f / density};
+    return {depth, 1.0f / density};
+}
+
+// One place on every chord of some points. Of points that are of no closed body none is asked.
+std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span<const std::uint32_t> which,
+                                        const Rgb& sigma_s, const ChordFinder& finder) {
+    std::vector<OnceScattered> places(chords.size());
+    std::vector<Ray> rays;
+    std::vector<std::size_t> index;  // of each ray
+    std::vector<V2f> u, u_away;
+    for (std::size_t at = 0; at < which.size(); ++at) {
+        const std::size_t first = at * ChordFinder::kChords;
+        if (!finder.is_closed(chords.subspan(first, ChordFinder::kChords))) continue;
+        finder.draw(kSeed + 1, which[at], u);
+        finder.draw(kSeed + 2, which[at], u_away);
+        for (std::size_t i = 0; i < ChordFinder::kChords; ++i) {
+            const Chord& chord = chords[first + i];
+            OnceScattered& place = places[first + i];
+            place = draw_place(chord, sigma_s, u[i]);
+            if (place.metres == 0.0f) continue;
+            rays.push_back({chord.ray.origin + chord.ray.direction * place.way, uniform_sphere(u_away[i])});
+            index.push_back(first + i);
+        }
+    }
+    const std::vector<float> on = finder.ways_out(rays);
+    for (std::size_t i = 0; i < on.size(); ++i) places[index[i]].way += on[i];
+    return places;
 }
 
 // What is absorbed of light that could go `way` metres, of which a half space absorbs `most`.
@@ -66,19 +91,18 @@ std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, c
     const float stretch = medium.eta * medium.eta / (1.0f - fresnel_average(medium.eta));
     std::vector<Rgb> gain(points.size(), Rgb(1.0f));
     const ChordFinder finder(scene, shells, mask);
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
-        std::vector<Chord> chords;
-        std::vector<V2f> u, u_away;
-        for (std::size_t k = begin; k < end; ++k) {
-            if (!finder.find(points, k, kSeed, chords)) continue;
-            std::vector<ScatteringPlace> places(chords.size());
-            if (traced > 0.0f) {
-                finder.draw(kSeed + 1, k, u);
-                finder.draw(kSeed + 2, k, u_away);
-                for (std::size_t i = 0; i < chords.size(); ++i) {
-                    places[i] = draw_place(chords[i], medium.sigma_s_prime, u[i], u_away[i], finder);
-                }
-            }
+        const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
+        const std::vector<Chord> all_chords = finder.find(points, which, kSeed);
+        const std::vector<OnceScattered> all_places =
+            traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
+                          : std::vector<OnceScattered>(all_chords.size());
+        for (std::size_t at = 0; at < which.size(); ++at) {
+            const std::span chords = std::span(all_chords).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
+            const std::span places = std::span(all_places).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
+            const std::size_t k = which[at];
+            if (!finder.is_closed(chords)) continue;
             for (int c = 0; c < 3; ++c) {
                 const float most = 1.0f - returned[c], plane = returned[c] - once[c];
                 if (!(most > 0.0f && plane > 0.0f)) continue;
