@@ -42,8 +42,9 @@ float strength_at(const Overlay& overlay, float age, const TexturePoint& texture
 }  // namespace
 
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const TexturePoint& texture_at, bool with_slope) {
+                       const TexturePoint& texture_at, bool with_slope, std::vector<float>* opacities) {
     Covering all;
+    if (opacities) opacities->assign(overlays.size(), 0.0f);
     all.roughness = all.bare_roughness = roughness;
     for (const Overlay& overlay : overlays) {
         const float strength = strength_at(overlay, age, texture_at);
@@ -60,6 +61,7 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
         }
         const float opacity = strength * mask;
         if (!(opacity > 0.0f)) continue;
+        if (opacities) (*opacities)[std::size_t(&overlay - overlays.data())] = opacity;
         const float scattered = opacity * overlay.scattering;
         all.covered = 1.0f - (1.0f - all.covered) * (1.0f - opacity);
         all.scattered = 1.0f - (1.0f - all.scattered) * (1.0f - scattered);
@@ -70,13 +72,7 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
     return all;
 }
 
-std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
-                                           const TexturePoint& texture_at) {
-    std::vector<float> opacity(overlays.size());
-    for (std::size_t k = 0; k < overlays.size(); ++k) {
-        const float strength = strength_at(overlays[k], age, texture_at);
-        if (strength > 0.0f) opacity[k] = strength * eval_pattern(overlays[k].pattern, point);
-    }
+std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, std::span<const float> opacity) {
     std::vector<CoveringSlope> slopes(overlays.size());
     for (std::size_t k = 0; k < overlays.size(); ++k) {
         if (!(opacity[k] > 0.0f)) continue;

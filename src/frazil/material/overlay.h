@@ -46,9 +46,10 @@ struct Covering {
     V3f slope = V3f(0.0f);                          // gradient of height in rest space
 };
 
-// `roughness` is the bare surface's. The slope is left 0 unless `with_slope`.
+// `roughness` is the bare surface's. The slope is left 0 unless `with_slope`. `opacities`, unless null, becomes each overlay's
+// here.
 Covering eval_overlays(std::span<const Overlay> overlays, float age, float roughness, const PatternPoint& point,
-                       const TexturePoint& at, bool with_slope);
+                       const TexturePoint& at, bool with_slope, std::vector<float>* opacities = nullptr);
 
 // How a covering changes with one overlay's opacity: derivatives by its logarithm.
 struct CoveringSlope {
@@ -56,8 +57,7 @@ struct CoveringSlope {
     Rgb reflectance = Rgb(0.0f), tint = Rgb(0.0f);
 };
 
-// One for each overlay.
-std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, float age, const PatternPoint& point,
-                                           const TexturePoint& at);
+// One for each overlay, of the opacities that eval_overlays tells.
+std::vector<CoveringSlope> covering_slopes(std::span<const Overlay> overlays, std::span<const float> opacities);
 
 }  // namespace frazil

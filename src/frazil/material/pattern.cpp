@@ -10,6 +10,9 @@ namespace frazil {
 namespace {
 
 constexpr int kPlaneFamilies = 4;
+// No gradient noise is larger: along each axis the corners' weighted mean distance is half a cell at most.
+constexpr float kMostNoise = 1.5f;
+constexpr int kMostPlanes = 6;  // of a family that are looked at one by one
 // Lines at a flat angle to the surface are widened no further than this.
 constexpr float kLeastSine = 0.25f;
 // Area of the walls between cells of unit size in a unit of volume, measured.
@@ -76,6 +79,18 @@ struct PlaneFamily {
         if (pattern.warp > 0.0f) h += pattern.warp * pattern.size * gradient_noise(p / (1.7f * pattern.size), seed);
         return h;
     }
+    // Whether no plane, however it is bent, has a line here: most places are told without any noise.
+    bool is_clear_of(const Pattern& pattern, const PatternPoint& at) const {
+        const float reach = 1.01f * (pattern.warp * pattern.size * kMostNoise +
+                                     0.5f * (pattern.width + pattern.feather) + at.footprint);
+        const float h = at.position.dot(normal);
+        const int first = int(std::floor((h - reach) / pitch)) - 1, last = int(std::floor((h + reach) / pitch)) + 1;
+        if (last - first > kMostPlanes) return false;
+        for (int i = first; i <= last; ++i) {
+            if (std::abs(h - offset(i)) <= reach) return false;
+        }
+        return true;
+    }
     // How much of the plane i is there at p.
     float extent(const Pattern& pattern, const V3f& p, int i, float footprint) const {
         if (pattern.amount >= 1.0f) return 1.0f;
@@ -93,6 +108,7 @@ float fracture_mask(const Pattern& pattern, const PatternPoint& at) {
     float left = 1.0f;
     for (int family = 0; family < kPlaneFamilies; ++family) {
         const PlaneFamily planes(pattern, family);
+        if (planes.is_clear_of(pattern, at)) continue;
         const float h = planes.height(pattern, at.position);
         const int nearest = int(std::floor(h / planes.pitch));
         for (int i = nearest - 1; i <= nearest + 1; ++i) {

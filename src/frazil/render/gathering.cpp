@@ -33,7 +33,9 @@ struct Places {
     std::vector<V3f> below, on_surface;
 };
 
-Places shared_places(std::span<const GatherRequest> requests, float cell, std::vector<std::uint32_t>& row_of) {
+using Requests = std::span<const GatherRequest* const>;
+
+Places shared_places(Requests requests, float cell, std::vector<std::uint32_t>& row_of) {
     struct Key {
         std::uint64_t hash;
         std::uint32_t request;
@@ -41,9 +43,9 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
     std::vector<Key> keys;
     for (std::uint32_t i = 0; i < requests.size(); ++i) {
         if (row_of[i] != kNoRow) continue;
-        const V3f at = requests[i].position / cell;
+        const V3f at = requests[i]->position / cell;
         const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
-        keys.push_back({std::uint64_t(requests[i].pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
+        keys.push_back({std::uint64_t(requests[i]->pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
     }
     std::sort(keys.begin(), keys.end(),
               [](const Key& a, const Key& b) { return a.hash != b.hash ? a.hash < b.hash : a.request < b.request; });
@@ -51,7 +53,7 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
         V3d sum(0.0), inwards(0.0);
         for (end = begin; end < keys.size() && keys[end].hash == keys[begin].hash; ++end) {
-            const GatherRequest& request = requests[keys[end].request];
+            const GatherRequest& request = *requests[keys[end].request];
             sum += V3d(request.position);
             inwards -= V3d(request.normal) * double(request.depth);
             row_of[keys[end].request] = static_cast<std::uint32_t>(places.below.size());
@@ -64,7 +66,7 @@ Places shared_places(std::span<const GatherRequest> requests, float cell, std::v
 
 // Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and those
 // of a lattice inside.
-Answers answers_for(const Body& body, std::span<const GatherRequest> requests, const GatherOptions& options) {
+Answers answers_for(const Body& body, Requests requests, const GatherOptions& options) {
     std::vector<std::uint32_t> row_of(requests.size(), kNoRow), is_blended;
     SumColumns columns;
     if (body.at_points) {
@@ -73,7 +75,7 @@ Answers answers_for(const Body& body, std::span<const GatherRequest> requests, c
     }
     CoreSums blended(columns);
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
-        const GatherRequest& request = requests[i];
+        const GatherRequest& request = *requests[i];
         if (request.is_primary) continue;
         const V3f position = request.position * body.to_points;
         V3f normal;
@@ -163,19 +165,22 @@ struct Gathering::Answer {
 
 void Gathering::answer(const GatherOptions& options, Tile& tile) const {
     // One gather per body: requests grouped by object, in their own order.
-    std::stable_sort(tile.requests.begin(), tile.requests.end(),
-                     [](const GatherRequest& a, const GatherRequest& b) { return a.object < b.object; });
-    for (std::size_t begin = 0; begin < tile.requests.size();) {
-        const Body& body = *bodies_[tile.requests[begin].object];
+    std::vector<const GatherRequest*> requests;
+    requests.reserve(tile.requests.size());
+    for (const GatherRequest& request : tile.requests) requests.push_back(&request);
+    std::stable_sort(requests.begin(), requests.end(),
+                     [](const GatherRequest* a, const GatherRequest* b) { return a->object < b->object; });
+    for (std::size_t begin = 0; begin < requests.size();) {
+        const Body& body = *bodies_[requests[begin]->object];
         std::size_t end = begin;
-        while (end < tile.requests.size() && tile.requests[end].object == tile.requests[begin].object) ++end;
+        while (end < requests.size() && requests[end]->object == requests[begin]->object) ++end;
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
-        const Answers answers = answers_for(body, std::span(tile.requests).subspan(begin, end - begin), with_layers);
+        const Answers answers = answers_for(body, Requests(requests).subspan(begin, end - begin), with_layers);
         tile.gathers += answers.gathers;
 
         for (std::size_t i = begin; i < end; ++i) {
-            const GatherRequest& request = tile.requests[i];
+            const GatherRequest& request = *requests[i];
             const Exitance exitance(body, answers.sums, answers.row_of[i - begin]);
             const Scales scales = exitance.scales(body.material->compensation);
             tile.subset = request.subset;

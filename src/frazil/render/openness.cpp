@@ -1,7 +1,9 @@
 #include "frazil/render/openness.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "frazil/base/random.h"
 #include "frazil/base/trigonometry.h"
 #include "frazil/translucency/normalized_diffusion.h"
 
@@ -9,8 +11,8 @@ namespace frazil {
 namespace {
 
 constexpr float kReach = 2.5f;  // of the blend, in spacings
-// Places of a pixel within so much of the spacing, whose normals agree, share a blend.
-constexpr float kClose = 0.25f, kLeastCosine = 0.9f;
+// Places of a pixel in a cell of so many spacings whose normals agree share a blend, at their mean.
+constexpr float kCell = 0.5f, kLeastCosine = 0.9f;
 
 // A profile whose mean radius is about `spacing`.
 Profile kernel_of(double spacing) {
@@ -69,28 +71,57 @@ void Openness::answer(Tile& tile) const {
 }
 
 void Openness::blend(const Baked& baked, std::span<const SeenPlace> places, Tile& tile) const {
-    const float close = kClose / kReach * baked.blend->reach();
-    const SeenPlace* last = nullptr;
-    float openness = 0.0f, weights = 0.0f;
-    V3f directions(0.0f);
-    for (const SeenPlace& place : places) {
-        const bool is_close = last && last->pixel == place.pixel &&
-                              (last->position - place.position).length2() < close * close &&
-                              last->normal.dot(place.normal) > kLeastCosine;
-        if (!is_close) {
-            const auto blend_at = [&](const V3f& normal) {
-                openness = 0.0f;
-                directions = V3f(0.0f);
-                weights = baked.blend->visit(place.position, normal, [&](std::uint32_t k, float weight) {
-                    openness += baked.openness[k] * weight;
-                    directions += baked.directions[k] * weight;
-                });
-            };
-            blend_at(place.normal);
-            if (weights == 0.0f) blend_at(-place.normal);  // a sheet with points on its other side alone
-            last = &place;
+    // Places of a pixel by the cell that they lie in; the first of each that is not served yet has a blend, which serves
+    // those that look the same way.
+    struct Key {
+        std::uint64_t cell;
+        std::uint32_t place;
+    };
+    const float size = kCell / kReach * baked.blend->reach();
+    std::vector<Key> keys;
+    keys.reserve(places.size());
+    for (std::uint32_t i = 0; i < places.size(); ++i) {
+        const V3f at = places[i].position / size;
+        const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
+        keys.push_back({std::uint64_t(places[i].pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
+    }
+    std::sort(keys.begin(), keys.end(),
+              [](const Key& a, const Key& b) { return a.cell != b.cell ? a.cell < b.cell : a.place < b.place; });
+    for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
+        while (end < keys.size() && keys[end].cell == keys[begin].cell) ++end;
+        std::size_t left = end;
+        while (left > begin) {
+            V3f sum(0.0f), normals(0.0f);
+            const V3f normal = places[keys[begin].place].normal;
+            std::size_t others = begin;
+            for (std::size_t k = begin; k < left; ++k) {
+                const SeenPlace& place = places[keys[k].place];
+                if (k == begin || place.normal.dot(normal) > kLeastCosine) {
+                    sum += place.position;
+                    normals += place.normal;
+                } else {
+                    std::swap(keys[others++], keys[k]);
+                }
+            }
+            const auto served = static_cast<float>(left - others);
+            add_blend(baked, places[keys[begin].place].pixel, sum / served, normals.normalized(), served, tile);
+            left = others;
         }
-        if (weights > 0.0f) tile.add_openness(place.pixel, openness / weights, directions / weights);
+    }
+}
+
+void Openness::add_blend(const Baked& baked, std::uint32_t pixel, const V3f& position, const V3f& normal, float places,
+                         Tile& tile) const {
+    for (const V3f& side : {normal, -normal}) {  // a sheet may have points on its other side alone
+        float openness = 0.0f;
+        V3f directions(0.0f);
+        const float weights = baked.blend->visit(position, side, [&](std::uint32_t k, float weight) {
+            openness += baked.openness[k] * weight;
+            directions += baked.directions[k] * weight;
+        });
+        if (weights == 0.0f) continue;
+        tile.add_openness(pixel, openness * (places / weights), directions * (places / weights));
+        return;
     }
 }
 

@@ -39,6 +39,9 @@ class Openness {
         std::unique_ptr<const PointTree> tree;  // where the spacing varies
     };
     void blend(const Baked& baked, std::span<const SeenPlace> places, Tile& tile) const;
+    // For so many places of a pixel.
+    void add_blend(const Baked& baked, std::uint32_t pixel, const V3f& position, const V3f& normal, float places,
+                   Tile& tile) const;
     void gather(const PointTree& tree, std::span<const SeenPlace> places, Tile& tile) const;
     void trace(std::span<const SeenPlace> places, Tile& tile) const;
 

@@ -33,12 +33,18 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
     }
 }
 
-FirstHit PathTracer::see(const Ray& camera_ray, Tile& tile) const {
-    FirstHit first;
-    first.ray = camera_ray;
-    ++tile.rays;
-    first.is_hit = ray_scene_.intersect(camera_ray, first.hit);
-    return first;
+void PathTracer::see(std::span<const Ray> camera_rays, std::vector<FirstHit>& seen, Tile& tile) const {
+    thread_local std::vector<Hit> hits;
+    thread_local std::vector<std::uint8_t> is_hit;
+    hits.resize(camera_rays.size()), is_hit.resize(camera_rays.size());
+    ray_scene_.intersect(camera_rays, hits, is_hit);
+    tile.rays += camera_rays.size();
+    seen.assign(camera_rays.size(), {});
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+        seen[i].ray = camera_rays[i];
+        seen[i].is_hit = is_hit[i] != 0;
+        seen[i].hit = hits[i];
+    }
 }
 
 void PathTracer::note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,

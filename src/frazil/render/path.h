@@ -38,8 +38,8 @@ class PathTracer {
                const FilmLayout& layout, int max_bounces, const PixelCone& pixel = {},
                const MotionVectors* motion = nullptr);
 
-    // What a sample sees first.
-    FirstHit see(const Ray& camera_ray, Tile& tile) const;
+    // What samples see first.
+    void see(std::span<const Ray> camera_rays, std::vector<FirstHit>& seen, Tile& tile) const;
     // Note it in the tile where that is certain before it is shaded: then it may stand for others, and they for it.
     void note_first(FirstHit& first, const V3f& view_axis, const Sampler& sampler, std::uint32_t pixel,
                     Tile& tile) const;

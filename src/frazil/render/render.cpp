@@ -219,6 +219,7 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
     const Canvas::Region r = canvas.region(index);
     const float aspect = static_cast<float>(options.width) / static_cast<float>(options.height);
     const ShadingPlan plan(options);
+    thread_local std::vector<Ray> rays;
     thread_local std::vector<FirstHit> hits;
     thread_local std::vector<Sampler> samplers;
     thread_local std::vector<ShadedSample> shaded;
@@ -227,15 +228,18 @@ void render_tile(const Scene& scene, const RenderOptions& options, const PathTra
             const auto tile_pixel = static_cast<std::uint32_t>((y - r.y0) * kTileSize + x - r.x0);
             const auto film_pixel = static_cast<std::uint32_t>(canvas.film_pixel(x, y));
             const auto [first, last] = canvas.samples(film_pixel);
-            hits.clear(), samplers.clear();
+            rays.clear(), samplers.clear();
             for (int sample = first; sample < last; ++sample) {
                 Sampler& sampler = samplers.emplace_back(options.seed, film_pixel, static_cast<std::uint32_t>(sample));
                 const V2f u = sampler.next_2d();
                 const float image_x = (x + 0.5f + filter.offset(u.x)) / options.width;
                 const float image_y = (y + 0.5f + filter.offset(u.y)) / options.height;
-                ++tile.camera_rays;
-                hits.push_back(tracer.see(camera_ray(scene.camera, image_x, image_y, aspect), tile));
-                if (plan.is_decoupled) tracer.note_first(hits.back(), view_axis, sampler, tile_pixel, tile);
+                rays.push_back(camera_ray(scene.camera, image_x, image_y, aspect));
+            }
+            tile.camera_rays += rays.size();
+            tracer.see(rays, hits, tile);
+            for (std::size_t k = 0; plan.is_decoupled && k < hits.size(); ++k) {
+                tracer.note_first(hits[k], view_axis, samplers[k], tile_pixel, tile);
             }
             if (!plan.is_decoupled) {
                 for (int k = 0; k < last - first; ++k) {

@@ -150,17 +150,17 @@ TexturePoint SurfaceResolver::texture_point(std::uint32_t object, std::uint32_t 
     return at;
 }
 
-Covering SurfaceResolver::covering(const IceMaterial& ice, const TexturePoint& at, float footprint,
-                                   bool with_bump) const {
+Covering SurfaceResolver::covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump,
+                                   std::vector<float>* opacities) const {
     const float roughness = eval_float(ice.roughness, at);
     const PatternPoint point{at.position, at.normal, footprint};
-    return eval_overlays(ice.overlays, ice.age, roughness, point, at, with_bump);
+    return eval_overlays(ice.overlays, ice.age, roughness, point, at, with_bump, opacities);
 }
 
 std::vector<CoveringSlope> SurfaceResolver::slopes(const Surface& surface) const {
     const auto* ice = std::get_if<IceMaterial>(&surface.material->model);
-    return ice ? covering_slopes(ice->overlays, ice->age, surface.place, surface.texture_point)
-               : std::vector<CoveringSlope>();
+    if (!ice || surface.overlay_opacities.empty()) return {};
+    return covering_slopes(ice->overlays, surface.overlay_opacities);
 }
 
 std::vector<float> SurfaceResolver::taken_by_overlays(std::uint32_t object, const PointSet& points) const {
@@ -192,8 +192,7 @@ void SurfaceResolver::look_at_points(std::uint32_t object, const PointSet& point
             const float footprint = std::sqrt(points.areas[k] * kInvPi);
             std::tie(at.long_axis, at.short_axis) = tangent_frame(at.normal);
             at.long_axis *= footprint, at.short_axis *= footprint;
-            surface.place = {at.position, at.normal, footprint};
-            surface.covering = covering(ice, at, footprint, false);
+            surface.covering = covering(ice, at, footprint, false, &surface.overlay_opacities);
             visit(k, surface);
         }
     });
@@ -301,8 +300,7 @@ void SurfaceResolver::look(const Hit& hit, const V3f& wo, float footprint, bool 
         mapped = ice ? mapped_normal(ice->normal, ice->bump, at) : mapped_normal(standard->normal, standard->bump, at);
     }
     if (ice) {
-        surface.place = {at.position, at.normal, footprint};
-        surface.covering = covering(*ice, at, footprint, with_bump);
+        surface.covering = covering(*ice, at, footprint, with_bump, with_bump ? &surface.overlay_opacities : nullptr);
         const V3f& slope = surface.covering.slope;
         if (slope != V3f(0.0f)) mapped = (mapped - (slope - mapped * mapped.dot(slope))).normalized();
     }

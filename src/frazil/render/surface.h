@@ -31,8 +31,8 @@ struct Surface {
     TexturePoint texture_point;      // where textures are read; st alone for materials that read none
     V3f local_position = V3f(0.0f);  // in the mesh's own space, in its rest pose
     Rgb display_color = Rgb(0.18f);
-    Covering covering;   // of ice: its overlays, with the roughness that they leave
-    PatternPoint place;  // where those read their patterns
+    Covering covering;                     // of ice: its overlays, with the roughness that they leave
+    std::vector<float> overlay_opacities;  // of those, one by one; empty where nobody asks
 };
 
 // Resolves hits into surfaces; holds what that needs per object.
@@ -63,7 +63,7 @@ class SurfaceResolver {
     // The part of light that the overlays let enter at each point of an object of ice; empty where all of it enters.
     std::vector<float> entering(std::uint32_t object, const PointSet& points) const;
 
-    // How the covering of a surface of ice changes with each overlay's opacity.
+    // How the covering of a surface of ice, resolved with bump or looked at, changes with each overlay's opacity.
     std::vector<CoveringSlope> slopes(const Surface& surface) const;
     // Which part of the light that enters each point an overlay takes, more by the logarithm of its opacity: (N, overlays).
     std::vector<float> taken_by_overlays(std::uint32_t object, const PointSet& points) const;
@@ -80,7 +80,8 @@ class SurfaceResolver {
     bool place(const Hit& hit, const V3f& direction, Surface& surface) const;
     // What patterns and images make of a place.
     void look(const Hit& hit, const V3f& wo, float footprint, bool with_bump, Surface& surface) const;
-    Covering covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump) const;
+    Covering covering(const IceMaterial& ice, const TexturePoint& at, float footprint, bool with_bump,
+                      std::vector<float>* opacities = nullptr) const;
     // Where textures are read on a triangle; its footprint is left to the caller. `normal` in world space.
     TexturePoint texture_point(std::uint32_t object, std::uint32_t triangle, const V2f& uv, const V3f& position,
                                const V3f& normal) const;
