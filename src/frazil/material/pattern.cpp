@@ -12,7 +12,8 @@ namespace {
 constexpr int kPlaneFamilies = 4;
 // No gradient noise is larger: along each axis the corners' weighted mean distance is half a cell at most.
 constexpr float kMostNoise = 1.5f;
-constexpr int kMostPlanes = 6;  // of a family that are looked at one by one
+constexpr float kMostOffset = 0.7f;  // of a plane, in pitches
+constexpr int kMostPlanes = 6;       // of a family that are looked at one by one
 // Lines at a flat angle to the surface are widened no further than this.
 constexpr float kLeastSine = 0.25f;
 // Area of the walls between cells of unit size in a unit of volume, measured.
@@ -72,7 +73,7 @@ struct PlaneFamily {
           pitch(pattern.size * kPlaneFamilies),
           seed(hash(pattern.seed, std::uint32_t(family))) {}
 
-    float offset(int i) const { return (float(i) + 0.7f * to_unit_float(hash(seed, std::uint32_t(i)))) * pitch; }
+    float offset(int i) const { return (float(i) + kMostOffset * to_unit_float(hash(seed, std::uint32_t(i)))) * pitch; }
     // The height over the unbent family, in metres.
     float height(const Pattern& pattern, const V3f& p) const {
         float h = p.dot(normal);
@@ -306,7 +307,10 @@ bool next_fracture(const Pattern& pattern, const V3f& origin, const V3f& directi
         // A bent plane is met within so much of where a straight one would be.
         const float margin = pattern.warp * pattern.size / std::abs(speed), base = origin.dot(planes.normal);
         const int step = speed > 0.0f ? 1 : -1;
-        const int first = int(std::floor((base + speed * t_min) / planes.pitch)) - 2 * step;
+        // The first that may be met: plane i stands 0 to kMostOffset pitches beyond i.
+        const float from = (base + speed * t_min) / planes.pitch,
+                    bend = pattern.warp * pattern.size / planes.pitch + 1e-3f;
+        const int first = int(std::floor(step > 0 ? from - bend - kMostOffset : from + bend)) + (step > 0 ? 1 : 0);
         for (int k = 0; k < 64; ++k) {
             const int i = first + step * k;
             const float straight = (planes.offset(i) - base) / speed, limit = is_found ? t : t_max;

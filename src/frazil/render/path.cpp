@@ -1,6 +1,7 @@
 #include "frazil/render/path.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "frazil/render/path_state.h"
 
@@ -35,14 +36,13 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
 
 void PathTracer::see(std::span<const Ray> camera_rays, std::vector<FirstHit>& seen, Tile& tile) const {
     thread_local std::vector<Hit> hits;
-    thread_local std::vector<std::uint8_t> is_hit;
-    hits.resize(camera_rays.size()), is_hit.resize(camera_rays.size());
-    ray_scene_.intersect(camera_rays, hits, is_hit);
+    hits.resize(camera_rays.size());
+    ray_scene_.intersect(camera_rays, hits);
     tile.rays += camera_rays.size();
     seen.assign(camera_rays.size(), {});
     for (std::size_t i = 0; i < seen.size(); ++i) {
         seen[i].ray = camera_rays[i];
-        seen[i].is_hit = is_hit[i] != 0;
+        seen[i].is_hit = std::isfinite(hits[i].t);
         seen[i].hit = hits[i];
     }
 }
