@@ -164,6 +164,8 @@ def _header_of(metadata: Mapping[str, Any], width: int, height: int) -> dict[str
     }
     for key, value in metadata.items():
         if key not in _OWN_ATTRIBUTES and not key.startswith(("oiio:", "openexr:")):
+            if not isinstance(value, bool | int | float | str) and np.size(value) == 0:
+                continue  # no attribute of OpenEXR holds an empty list
             name = _STANDARD_NAMES.get(key, key)
             header[name] = _attribute_of(name, value)
     return header

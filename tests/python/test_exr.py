@@ -88,6 +88,13 @@ def test_large_seeds_come_back(tmp_path):
     assert int(exr.read_exr(tmp_path / "a.exr")[1]["frazil:seed"]) == 2**32 - 1
 
 
+def test_empty_lists_are_left_out(tmp_path):
+    exr.write_exr(tmp_path / "a.exr", some_layers(), LETTERS, metadata={"frazil:aovs": [], "frazil:seed": 3})
+    metadata = exr.read_exr(tmp_path / "a.exr")[1]
+    assert "frazil:aovs" not in metadata
+    assert metadata["frazil:seed"] == 3
+
+
 def test_views_that_are_not_contiguous_are_written(tmp_path):
     view = some_layers()["beauty"][::-2, ::3]
     exr.write_exr(tmp_path / "a.exr", {"beauty": view}, LETTERS)
