@@ -19,6 +19,9 @@ constexpr std::size_t kChunk = 2048, kLargestChunk = 8192, kChunks = 64;
 constexpr std::size_t kLeafPlaces = 48;  // no smaller blocks are made
 // Half a block's diagonal that a source is smooth across, over the radius of a cluster that may stand for it, squared.
 constexpr float kSmooth = 2.0f;
+// The squared radius of a cluster over its trace, a tenth above that of a square: what lies far out
+// counts by how much it is, as in the error of a mean kernel.
+constexpr float kSquareOfTrace = 3.3f;
 constexpr std::size_t kCacheLine = 64;
 
 // The shading points that the tree reaches, along a Morton curve; to the rest belongs exactly nothing.
@@ -103,7 +106,7 @@ class BlockGather {
                 const float q = squared_distance(box, node.center);
                 const float beyond = node.radius + tree_.kernel->table.reach;
                 if (q > beyond * beyond) continue;
-                const float squared = node.radius * node.radius + (has_footprints_ ? 4.0f * node.footprint : 0.0f);
+                const float squared = kSquareOfTrace * (node.trace + (has_footprints_ ? 2.0f * node.footprint : 0.0f));
                 const float largest = rule_.largest_squared(q);
                 const bool is_smooth = has_nodes && half_squared * kSmooth <= largest;
                 const bool is_cluster = squared <= largest && (!node.is_leaf() || node.size() > 1);

@@ -19,7 +19,7 @@ class OpeningRule {
   public:
     OpeningRule(const Profile& profile, const KernelTable& table, bool has_ramp, float tolerance);
 
-    // The largest squared radius of a cluster at squared distance q.
+    // The largest squared radius of a cluster at squared distance q, by its second moments.
     float largest_squared(float q) const {
         const float u = 1.0f + q * inverse_z0_squared_;
         const std::uint32_t bits = std::bit_cast<std::uint32_t>(u) - std::bit_cast<std::uint32_t>(1.0f);
