@@ -2,7 +2,7 @@
 // Model: a cluster's mean kernel is exact to second order, so its error grows as (size * bend)³, bend the profile's
 //   relative change per metre, whatever light is on it, so that a group is held to it also where it alone is dark.
 // Units: metres.
-// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.11 % RMS and 0.4 % at worst, 0.003 0.04 % and 0.2 %; by
+// Valid: measured by bench/gather.py on a bunny: 0.01 gives 0.09 % RMS and 0.5 % at worst, 0.003 0.04 % and 0.2 %; by
 //   other bodies and lights: docs/translucency.md.
 // Not: a bound; it is calibrated.
 #pragma once
