@@ -40,10 +40,11 @@ def make_sky(width: int, sun: np.ndarray, seed: int) -> np.ndarray:
     near_sun = np.exp(-(1.0 - toward_sun) / 0.05) + 0.35 * np.exp(-(1.0 - toward_sun) / 0.35)
     sky += near_sun[:, None] * kGlow * (0.4 + 0.9 * low)
 
-    sky = _add_clouds(sky, direction, toward_sun, noise, np.pi / height)
-    sky = _add_ridges(sky, direction, toward_sun, noise)
+    texel = np.pi / height
+    sky = _add_clouds(sky, direction, toward_sun, noise, texel)
+    sky = _add_ridges(sky, direction, toward_sun, noise, texel)
     ground = kSnowfield * (0.75 + 0.25 * side)
-    blend = np.clip(up / 0.004 + 0.5, 0.0, 1.0)[:, None]
+    blend = np.clip(up / max(0.004, texel) + 0.5, 0.0, 1.0)[:, None]
     return (sky * blend + ground * (1.0 - blend)).reshape(height, width, 3).astype(np.float32)
 
 
@@ -72,7 +73,7 @@ def _add_clouds(sky, direction, toward_sun, noise: Noise, texel: float):
     return result
 
 
-def _add_ridges(sky, direction, toward_sun, noise: Noise):
+def _add_ridges(sky, direction, toward_sun, noise: Noise, texel: float):
     around = direction * [1.0, 0.0, 1.0]
     around /= np.maximum(np.linalg.norm(around, axis=1, keepdims=True), 1e-9)
     elevation = np.arcsin(np.clip(direction[:, 1], -1.0, 1.0))
@@ -82,7 +83,8 @@ def _add_ridges(sky, direction, toward_sun, noise: Noise):
     for layer, (height, haze) in enumerate([(0.105, 0.78), (0.055, 0.52)]):
         rough = noise.fractal(around + 3.0 * layer, 0.35, 6, 50 + 10 * layer, 0.52)
         crest = height * (0.62 + 0.55 * rough)
-        inside = np.clip((crest - elevation) / 0.0025 + 0.5, 0.0, 1.0)[:, None]
+        # No sharper than a texel: a crest would go down in steps.
+        inside = np.clip((crest - elevation) / max(0.0025, texel) + 0.5, 0.0, 1.0)[:, None]
         slope = noise.fractal(direction * [1.0, 0.55, 1.0], 0.045, 4, 70 + 10 * layer, 0.6)
         rock = np.array([0.25, 0.33, 0.46]) + 0.16 * np.clip(slope, -0.4, 1.0)[:, None]
         air = np.array([0.66, 0.78, 0.92]) * (0.85 + 0.25 * toward_sun[:, None])
