@@ -52,6 +52,11 @@ std::uint32_t direction_cell(const V3f& d) {
 template <class Use>
 void for_each_packet(std::span<const Ray> rays, const Use& use) {
     thread_local std::vector<std::uint32_t> cells, order;
+    if (rays.size() <= kPacket) {  // one packet, whatever their order
+        constexpr std::array<std::uint32_t, kPacket> kAsGiven{0, 1, 2, 3, 4, 5, 6, 7};
+        if (!rays.empty()) use(kAsGiven.data(), rays.size());
+        return;
+    }
     std::array<std::uint32_t, (std::size_t(1) << (2 * kCellBits)) + 1> first{};
     cells.resize(rays.size()), order.resize(rays.size());
     for (std::size_t i = 0; i < rays.size(); ++i) {

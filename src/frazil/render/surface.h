@@ -55,8 +55,8 @@ class SurfaceResolver {
     // Where a hit lies, in world space: the position that resolve gives it.
     V3f position(const Hit& hit) const;
 
-    // What each point of an object of ice shows over the disc of its area: texture coordinates, patterns' place and
-    // covering; the rest is left out. visit(point, surface) comes from several threads at once.
+    // What each point of an object of ice shows over the disc of its area: texture coordinates, covering and
+    // overlays' opacities; the rest is left out. visit(point, surface) comes from several threads at once.
     void look_at_points(std::uint32_t object, const PointSet& points,
                         const std::function<void(std::size_t point, const Surface& surface)>& visit) const;
 
