@@ -90,6 +90,31 @@ TEST_CASE("sampler: a scrambled net is a (0,m,2)-net for every sequence, a new o
     }
 }
 
+TEST_CASE("sampler: parts of a net's sequence that follow one another are one net together") {
+    constexpr int kCount = 8, kLog = 3;
+    const ScrambledNet net{kCount};
+    for (const int log_parts : {0, 1, 2, 5}) {
+        const std::uint32_t parts = 1U << log_parts;
+        const int m = kLog + log_parts;
+        for (const std::uint32_t first : {0U, 3U * parts, 40000U * parts}) {
+            std::vector<V2f> points;
+            for (std::uint32_t part = first; part < first + parts; ++part) {
+                std::vector<V2f> drawn(kCount);
+                net.draw_part(5U, part, drawn);
+                points.insert(points.end(), drawn.begin(), drawn.end());
+            }
+            for (int a = 0; a <= m; ++a) {
+                std::set<std::pair<int, int>> boxes;
+                for (const V2f& p : points) boxes.insert({int(p.x * float(1 << a)), int(p.y * float(1 << (m - a)))});
+                REQUIRE(boxes.size() == points.size());
+            }
+        }
+    }
+    std::vector<V2f> one(kCount), other(kCount);
+    net.draw_part(5U, 7U, one), net.draw_part(6U, 7U, other);
+    CHECK(one != other);
+}
+
 TEST_CASE("trigonometry: the polynomials are within their bounds") {
     double worst_circle = 0.0, worst_angle = 0.0;
     for (int i = 0; i <= 100000; ++i) {

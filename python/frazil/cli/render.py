@@ -85,7 +85,9 @@ def render_command(
     spacing_pixels: Annotated[
         float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels, so that far ice takes fewer.")
     ] = 0.0,
-    bake_samples: Annotated[int, typer.Option(metavar="N", help="Shadow rays per point and light.")] = 64,
+    bake_samples: Annotated[
+        int, typer.Option(metavar="N", help="Shadow rays per point and light; half as many look for bounced light.")
+    ] = 32,
     bake_error: Annotated[
         float,
         typer.Option(metavar="ERROR", help="Relative error of a point's light until which it gets more rays. 0 = off."),

@@ -83,6 +83,7 @@ ScrambledNet::ScrambledNet(int count) {
         x_.push_back(reverse_bits(point.x));
         y_.push_back(reverse_bits(point.y));
     }
+    while ((1 << bits_) < count) ++bits_;
 }
 
 void ScrambledNet::draw(std::uint32_t seed, std::uint32_t sequence, std::span<V2f> out) const {
@@ -90,6 +91,17 @@ void ScrambledNet::draw(std::uint32_t seed, std::uint32_t sequence, std::span<V2
     for (std::size_t i = 0; i < x_.size(); ++i) {
         out[i] = {to_unit_float(reverse_bits(laine_karras(x_[i], key_x))),
                   to_unit_float(reverse_bits(laine_karras(y_[i], key_y)))};
+    }
+}
+
+void ScrambledNet::draw_part(std::uint32_t seed, std::uint32_t part, std::span<V2f> out) const {
+    // The sequence's coordinates are linear in the index: a part's points are the first ones, moved by exclusive or.
+    const std::uint32_t start = owen_scramble(part, hash(seed, 3U)) << bits_;
+    const std::uint32_t start_y = reverse_bits(sobol_second(start));
+    const std::uint32_t key_x = hash(seed, 1U), key_y = hash(seed, 2U);
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+        out[i] = {to_unit_float(reverse_bits(laine_karras(x_[i] ^ start, key_x))),
+                  to_unit_float(reverse_bits(laine_karras(y_[i] ^ start_y, key_y)))};
     }
 }
 

@@ -43,8 +43,13 @@ class ScrambledNet {
 
     // Fill out[0 .. size()).
     void draw(std::uint32_t seed, std::uint32_t sequence, std::span<V2f> out) const;
+    // The same of one long sequence's part: parts that follow one another (each of a power of two of points) fill the square
+    // together, so that the mean over neighbours has less noise than that of as many sequences. Two seeds' parts of one number
+    // are not independent of each other.
+    void draw_part(std::uint32_t seed, std::uint32_t part, std::span<V2f> out) const;
 
   private:
+    int bits_ = 0;                      // of the count, rounded up
     std::vector<std::uint32_t> x_, y_;  // unscrambled coordinates, bits reversed
 };
 

@@ -122,7 +122,7 @@ void RayMaker::make_rays(std::uint32_t point, const BakeTask& task, std::uint32_
     rays.place_of.resize(n);
     rays.order.resize(n);
     if (!world_light.is_dome()) {
-        whole_.draw(seed, point, rays.u);
+        whole_.draw_part(seed, rays.part, rays.u);
         spread(0, n, hash(seed, point), rays);
         for_each_place(0, n, rays, [&](const Place& place, std::size_t first, std::size_t count) {
             world_light.sample(place.position, std::span(rays.u).subspan(first, count),
@@ -130,7 +130,7 @@ void RayMaker::make_rays(std::uint32_t point, const BakeTask& task, std::uint32_
         });
         if (rays.samples.front().is_delta) one_each(world_light, rays);
     } else if (world_light.is_uniform_dome() && !has_portal_before(world_light, rays)) {
-        whole_.draw(seed, point, rays.u);
+        whole_.draw_part(seed, rays.part, rays.u);
         spread(0, n, hash(seed, point), rays);
         sample_cosine(0, n, rays);
         for (LightSample& sample : rays.samples) sample.radiance = world_light.dome_radiance(sample.direction);
@@ -176,8 +176,8 @@ void RayMaker::sample_dome(const WorldLight& dome, std::uint32_t point, std::uin
     const std::size_t n = rays.u.size(), half = first_half_.size();
     const std::span<V2f> u(rays.u);
     const std::span<LightSample> samples(rays.samples);
-    if (half > 0) first_half_.draw(seed, point, u.first(half));
-    second_half_.draw(seed + 0x9e3779b9U, point, u.subspan(half));
+    if (half > 0) first_half_.draw_part(seed, rays.part, u.first(half));
+    second_half_.draw_part(seed + 0x9e3779b9U, rays.part, u.subspan(half));
     spread(0, half, hash(seed, point), rays);
     spread(half, n, hash(seed + 1, point), rays);
     sample_cosine(0, half, rays);

@@ -55,6 +55,7 @@ struct BakeRays {
     LightPicker::Weights weights;
     std::size_t count = 0;      // samples that the rays stand for
     std::uint64_t dropped = 0;  // samples that are not finite
+    std::uint32_t part = 0;     // of the points' sequence, which samples are this point's: its number in the curve
 };
 
 // A light that reaches the component, or a crowd of them, and where its irradiance goes.

@@ -40,7 +40,7 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
         for (std::size_t k = begin; k < end; ++k) {
             const std::uint32_t i = order[k];
             find_places(points, options.cells, i, places);
-            net.draw(hash(options.seed, 0x626f756eU), i, u);
+            net.draw_part(hash(options.seed, 0x626f756eU), std::uint32_t(k), u);
             deal(places, 0, hash(options.seed, i), place_of);
             for (std::size_t sample = 0; sample < u.size(); ++sample) {
                 const Place& place = places[place_of[sample]];

@@ -213,7 +213,7 @@ Occlusion bake_occlusion(const PointSet& points, const RayScene& scene, const Oc
             const V3f& normal = points.normals[i];
             const V3f origin = offset_origin(points.positions[i], normal);
             const auto [s, t] = tangent_frame(normal);
-            net.draw(options.seed, i, u);
+            net.draw_part(options.seed, std::uint32_t(k), u);
             for (const V2f& sample : u) {
                 const V3f local = cosine_hemisphere(sample);
                 rays.push_back({origin, s * local.x + t * local.y + normal * local.z, 0.0f, options.distance});

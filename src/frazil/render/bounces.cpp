@@ -209,7 +209,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     if (points == 0) return;
 
     // What each point sees: ice, along lines that all bounces take, and what straight light makes of other surfaces.
-    const std::size_t wanted = static_cast<std::size_t>(std::max(1, options.bake_samples / 4));
+    const std::size_t wanted = static_cast<std::size_t>(std::max(1, options.bake_samples / 2));
     const int rays = static_cast<int>(std::clamp<std::size_t>(kMostSightlines / points, 1, wanted));
     std::vector<std::vector<PointLook>> looks(lit.size());
     std::vector<std::vector<float>> entering(lit.size());

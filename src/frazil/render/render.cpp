@@ -33,6 +33,7 @@ constexpr std::size_t kMostPointGathers = std::size_t(1) << 30;
 // Samples of a pass: those of a tile share one gather, which bounds its memory; with a noise target passes are shorter, where
 // few samples are shaded they are longer.
 constexpr int kSamplesPerPass = 32, kSamplesPerNoisePass = 16, kMostSamplesPerPass = 128;
+constexpr int kOpennessRays = 2, kMostOpennessRays = 1 << 20;  // at a point, times its shadow rays
 
 std::vector<std::size_t> groups_of(const std::vector<Light>& lights, const std::vector<std::string>& groups) {
     std::vector<std::size_t> result;
@@ -290,7 +291,8 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
                     stats);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
-            openness.emplace(lit, ray_scene, options.bake_samples, options.seed);
+            const int rays = std::min(kOpennessRays * options.bake_samples, kMostOpennessRays);
+            openness.emplace(lit, ray_scene, rays, options.seed);
         }
     };
     if (baked) {
