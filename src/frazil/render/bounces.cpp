@@ -14,6 +14,7 @@ namespace frazil {
 namespace {
 
 constexpr int kShadowRaysPerReflection = 1;  // per light, where a diffuse surface is seen
+constexpr float kBounceTolerance = 20.0f;    // of gathers, times the render's
 // Of so many bounces on the last two tell what all after them bring: no more than 19 times the last.
 constexpr int kFewestForTail = 3;
 constexpr double kLargestRatio = 0.95;
@@ -44,8 +45,9 @@ Exchange exchange_of(const Body& body, const PlacedPoints& points, std::vector<R
     // Ramps colour what is seen, not what bounces: they stay exact to change after the render.
     const auto tree = make_tree(points, body.plain_kernel, irradiance, groups);
     const std::vector<V3f> positions = points.cloud().inward_positions();
-    // Bounces average over many points, and compensation keeps their energy: the plain sum will do.
-    Gathered gathered = tree->gather(positions.data(), positions.size(), {options.tolerance, Estimator::sum, false});
+    // Bounces average over many points, and compensation keeps their energy: the plain sum will do, and large clusters.
+    const GatherOptions coarse{kBounceTolerance * options.tolerance, Estimator::sum, false};
+    Gathered gathered = tree->gather(positions.data(), positions.size(), coarse);
     compensate_bounce(body, gains, gathered);
     // Light of one scattering that camera rays trace leaves here as from a plane.
     for (std::size_t i = 0; i < irradiance.size(); ++i) gathered.exitance[i] += irradiance[i] * body.traced_once;

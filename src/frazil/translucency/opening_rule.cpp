@@ -5,8 +5,11 @@
 namespace frazil {
 namespace {
 
-// Calibrated on ten bodies (bench/gather.py): how a tolerance becomes a size, and its largest.
-constexpr double kSizePerTolerance = 1000.0, kLargestCubed = 7.5, kRampCaution = 0.4;
+// Calibrated on ten bodies (bench/gather.py): how a tolerance becomes a size, and the largest of a tolerance that bounds
+// every error.
+constexpr double kSizePerTolerance = 1000.0, kUsualCubed = 7.5, kRampCaution = 0.4;
+// Beyond this tolerance it is the mean error that counts, not the largest.
+constexpr double kCoarseTolerance = 0.01;
 // What a distance's ring has of the albedo, below which errors need not be relative to it: clusters grow, so many times at
 // most. Light that is this dark among its group's own is as exact as the rest.
 constexpr double kFaintShare = 1e-6, kFaintest = 10.0;
@@ -14,6 +17,11 @@ constexpr double kFaintShare = 1e-6, kFaintest = 10.0;
 constexpr double kLengthPerBend = 1.5;
 // A cluster is never seen from nearer than its radius over this.
 constexpr double kWidest = 0.6;
+
+double size_cubed(double tolerance) {
+    if (tolerance > kCoarseTolerance) return kUsualCubed * tolerance / kCoarseTolerance;
+    return std::min(kUsualCubed, kSizePerTolerance * tolerance);
+}
 
 }  // namespace
 
@@ -31,8 +39,7 @@ OpeningRule::OpeningRule(const Profile& profile, const KernelTable& table, bool 
             const double length = std::min(mean_free_path(profile, c), kLengthPerBend * bend_length(profile, c));
             const double bend = 1.5 / std::hypot(r, length) + decay;
             const double share = 6.0 * (r * r + shortest * shortest) * f / total;
-            const double cubed =
-                std::min(kLargestCubed, kSizePerTolerance * tolerance) * (has_ramp ? kRampCaution : 1.0);
+            const double cubed = size_cubed(tolerance) * (has_ramp ? kRampCaution : 1.0);
             limit = std::min(limit, std::cbrt(cubed * std::clamp(kFaintShare / share, 1.0, kFaintest)) / bend);
         }
         largest_[i] = static_cast<float>(limit * limit);
