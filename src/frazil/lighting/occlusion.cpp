@@ -23,6 +23,11 @@ void check(const PointSet& points, float distance) {
     if (!(distance > 0.0f)) throw ValueError(str("occlusion: distance must be > 0, got ", distance, "."));
 }
 
+const OcclusionOptions& checked(const OcclusionOptions& options) {
+    if (options.samples >= 1 && options.samples <= (1 << 20)) return options;
+    throw ValueError(str("occlusion: samples must be in [1, 2^20], got ", options.samples, "."));
+}
+
 // The hemisphere over a point as a raster of its cosine-weighted measure: a disk of equal cells [Christensen2008].
 class Raster {
   public:
@@ -195,43 +200,50 @@ class DiskTree {
 
 }  // namespace
 
+OcclusionBaker::OcclusionBaker(const RayScene& scene, const OcclusionOptions& options)
+    : scene_(scene), options_(options), net_(checked(options).samples) {}
+
+std::size_t OcclusionBaker::run_size() const {
+    return std::clamp<std::size_t>(kRaysPerBatch / net_.size(), 1, kPointsPerChunk);
+}
+
+void OcclusionBaker::bake(const PointSet& points, std::span<const std::uint32_t> run, std::size_t first,
+                          Occlusion& result) const {
+    std::vector<V2f> u(net_.size());
+    std::vector<Ray> rays;
+    for (const std::uint32_t i : run) {
+        const V3f& normal = points.normals[i];
+        const V3f origin = offset_origin(points.positions[i], normal);
+        const auto [s, t] = tangent_frame(normal);
+        net_.draw_part(options_.seed, std::uint32_t(first++), u);
+        for (const V2f& sample : u) {
+            const V3f local = cosine_hemisphere(sample);
+            rays.push_back({origin, s * local.x + t * local.y + normal * local.z, 0.0f, options_.distance});
+        }
+    }
+    std::vector<std::uint8_t> is_hidden(rays.size());
+    scene_.are_occluded(rays, is_hidden);
+    std::size_t ray = 0;
+    for (const std::uint32_t i : run) {
+        int open = 0;
+        V3f mean(0.0f);
+        for (std::size_t sample = 0; sample < net_.size(); ++sample, ++ray) {
+            if (is_hidden[ray]) continue;
+            ++open;
+            mean += rays[ray].direction;
+        }
+        result.openness[i] = float(open) / float(net_.size());
+        result.bent_normals[i] = mean.length2() > 0.0f ? mean.normalized() : points.normals[i];
+    }
+}
+
 Occlusion bake_occlusion(const PointSet& points, const RayScene& scene, const OcclusionOptions& options) {
     check(points, options.distance);
-    if (options.samples < 1 || options.samples > (1 << 20)) {
-        throw ValueError(str("occlusion: samples must be in [1, 2^20], got ", options.samples, "."));
-    }
-    Occlusion result{std::vector<float>(points.size(), 1.0f), points.normals};
-    const ScrambledNet net(options.samples);
+    const OcclusionBaker baker(scene, options);
+    Occlusion result{std::vector<float>(points.size()), std::vector<V3f>(points.size())};
     const std::vector<std::uint32_t> order = morton_order(points.positions);
-    // As many points at a time as keep their rays in the cache.
-    const std::size_t batch = std::clamp<std::size_t>(kRaysPerBatch / net.size(), 1, kPointsPerChunk);
-    parallel_for(points.size(), batch, [&](std::size_t begin, std::size_t end) {
-        std::vector<V2f> u(net.size());
-        std::vector<Ray> rays;
-        for (std::size_t k = begin; k < end; ++k) {
-            const std::uint32_t i = order[k];
-            const V3f& normal = points.normals[i];
-            const V3f origin = offset_origin(points.positions[i], normal);
-            const auto [s, t] = tangent_frame(normal);
-            net.draw_part(options.seed, std::uint32_t(k), u);
-            for (const V2f& sample : u) {
-                const V3f local = cosine_hemisphere(sample);
-                rays.push_back({origin, s * local.x + t * local.y + normal * local.z, 0.0f, options.distance});
-            }
-        }
-        std::vector<std::uint8_t> is_hidden(rays.size());
-        scene.are_occluded(rays, is_hidden);
-        for (std::size_t k = begin, ray = 0; k < end; ++k) {
-            int open = 0;
-            V3f mean(0.0f);
-            for (std::size_t sample = 0; sample < net.size(); ++sample, ++ray) {
-                if (is_hidden[ray]) continue;
-                ++open;
-                mean += rays[ray].direction;
-            }
-            result.openness[order[k]] = float(open) / float(net.size());
-            if (mean.length2() > 0.0f) result.bent_normals[order[k]] = mean.normalized();
-        }
+    parallel_for(points.size(), baker.run_size(), [&](std::size_t begin, std::size_t end) {
+        baker.bake(points, std::span(order).subspan(begin, end - begin), begin, result);
     });
     return result;
 }

@@ -10,8 +10,10 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
+#include "frazil/base/sampler.h"
 #include "frazil/geometry/ray_scene.h"
 #include "frazil/points/point_set.h"
 
@@ -26,6 +28,24 @@ struct OcclusionOptions {
 struct Occlusion {
     std::vector<float> openness;    // (N)
     std::vector<V3f> bent_normals;  // (N) unit length; the normal where nothing is open
+};
+
+// Traces a few points at a time. The scene must outlive it.
+class OcclusionBaker {
+  public:
+    // ValueError for options out of range.
+    OcclusionBaker(const RayScene& scene, const OcclusionOptions& options);
+
+    // As many points of a run as keep their rays in the cache.
+    std::size_t run_size() const;
+    // Of a run of points in an order in which neighbours are near, the `first` in that order and on: openness[run[i]] and
+    // bent_normals[run[i]].
+    void bake(const PointSet& points, std::span<const std::uint32_t> run, std::size_t first, Occlusion& result) const;
+
+  private:
+    const RayScene& scene_;
+    OcclusionOptions options_;
+    ScrambledNet net_;
 };
 
 // ValueError for options out of range or points without normals.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frazil/base/morton_order.h"
 #include "frazil/base/random.h"
 #include "frazil/base/trigonometry.h"
 #include "frazil/translucency/normalized_diffusion.h"
@@ -20,24 +21,50 @@ Profile kernel_of(double spacing) {
     return NormalizedDiffusion(Medium{Rgb(sigma), Rgb(sigma), 1.0f});
 }
 
+// Openness, and bent normals times it.
+std::unique_ptr<const PointTree> tree_of(const PointSet& points, const Occlusion& occlusion) {
+    std::vector<Rgb> values;
+    values.reserve(2 * points.size());
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        values.emplace_back(occlusion.openness[k]);
+        values.push_back(occlusion.bent_normals[k] * occlusion.openness[k]);
+    }
+    return std::make_unique<const PointTree>(points, std::move(values), 2, kernel_of(points.spacing));
+}
+
 }  // namespace
 
-Openness::Baked::Baked(const PointSet& points, const Occlusion& occlusion) {
-    if (!PointBlend::suits(points)) {
-        std::vector<Rgb> values;
-        values.reserve(2 * points.size());
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            values.emplace_back(occlusion.openness[k]);
-            values.push_back(occlusion.bent_normals[k] * occlusion.openness[k]);
-        }
-        tree = std::make_unique<const PointTree>(points, std::move(values), 2, kernel_of(points.spacing));
-        return;
+Openness::Points::Points(const PointSet& points, const RayScene& scene, const OcclusionOptions& options)
+    : blend_(points, kReach), baker_(scene, options) {
+    for (const std::uint32_t k : blend_.order()) {
+        points_.positions.push_back(points.positions[k]);
+        points_.normals.push_back(points.normals[k]);
     }
-    blend.emplace(points, kReach);
-    for (const std::uint32_t k : blend->order()) {
-        openness.push_back(occlusion.openness[k]);
-        directions.push_back(occlusion.bent_normals[k] * occlusion.openness[k]);
-    }
+    order_ = morton_order(points_.positions);
+    run_of_.resize(order_.size());
+    const std::size_t size = baker_.run_size(), runs = (order_.size() + size - 1) / size;
+    for (std::size_t i = 0; i < order_.size(); ++i) run_of_[order_[i]] = static_cast<std::uint32_t>(i / size);
+    occlusion_.openness.resize(order_.size());
+    occlusion_.bent_normals.resize(order_.size());
+    is_baked_ = std::vector<std::atomic<bool>>(runs);
+    mutexes_ = std::vector<std::mutex>(runs);
+}
+
+float Openness::Points::add(const V3f& position, const V3f& normal, float& openness, V3f& directions) const {
+    return blend_.visit(position, normal, [&](std::uint32_t k, float weight) {
+        const std::uint32_t run = run_of_[k];
+        if (!is_baked_[run].load(std::memory_order_acquire)) bake_run(run);
+        openness += occlusion_.openness[k] * weight;
+        directions += occlusion_.bent_normals[k] * (occlusion_.openness[k] * weight);
+    });
+}
+
+void Openness::Points::bake_run(std::uint32_t run) const {
+    const std::lock_guard lock(mutexes_[run]);
+    if (is_baked_[run].load(std::memory_order_relaxed)) return;
+    const std::size_t begin = run * baker_.run_size(), end = std::min(order_.size(), begin + baker_.run_size());
+    baker_.bake(points_, std::span(order_).subspan(begin, end - begin), begin, occlusion_);
+    is_baked_[run].store(true, std::memory_order_release);
 }
 
 Openness::Openness(const std::vector<LitPoints>& lit, const RayScene& scene, int samples, std::uint32_t seed)
@@ -48,7 +75,13 @@ Openness::Openness(const std::vector<LitPoints>& lit, const RayScene& scene, int
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         const PointSet points = lit[i].points.in_world();
-        baked_[i] = std::make_unique<const Baked>(points, bake_occlusion(points, scene, options));
+        auto baked = std::make_unique<Baked>();
+        if (PointBlend::suits(points)) {
+            baked->points.emplace(points, scene, options);
+        } else {
+            baked->tree = tree_of(points, bake_occlusion(points, scene, options));
+        }
+        baked_[i] = std::move(baked);
     }
 }
 
@@ -64,20 +97,20 @@ void Openness::answer(Tile& tile) const {
         } else if (baked_[object]->tree) {
             gather(*baked_[object]->tree, places, tile);
         } else {
-            blend(*baked_[object], places, tile);
+            blend(*baked_[object]->points, places, tile);
         }
     }
     tile.places.clear();
 }
 
-void Openness::blend(const Baked& baked, std::span<const SeenPlace> places, Tile& tile) const {
+void Openness::blend(const Points& points, std::span<const SeenPlace> places, Tile& tile) const {
     // Places of a pixel by the cell that they lie in; the first of each that is not served yet has a blend, which serves
     // those that look the same way.
     struct Key {
         std::uint64_t cell;
         std::uint32_t place;
     };
-    const float size = kCell / kReach * baked.blend->reach();
+    const float size = kCell / kReach * points.reach();
     std::vector<Key> keys;
     keys.reserve(places.size());
     for (std::uint32_t i = 0; i < places.size(); ++i) {
@@ -104,21 +137,18 @@ void Openness::blend(const Baked& baked, std::span<const SeenPlace> places, Tile
                 }
             }
             const auto served = static_cast<float>(left - others);
-            add_blend(baked, places[keys[begin].place].pixel, sum / served, normals.normalized(), served, tile);
+            add_blend(points, places[keys[begin].place].pixel, sum / served, normals.normalized(), served, tile);
             left = others;
         }
     }
 }
 
-void Openness::add_blend(const Baked& baked, std::uint32_t pixel, const V3f& position, const V3f& normal, float places,
-                         Tile& tile) const {
+void Openness::add_blend(const Points& points, std::uint32_t pixel, const V3f& position, const V3f& normal,
+                         float places, Tile& tile) const {
     for (const V3f& side : {normal, -normal}) {  // a sheet may have points on its other side alone
         float openness = 0.0f;
         V3f directions(0.0f);
-        const float weights = baked.blend->visit(position, side, [&](std::uint32_t k, float weight) {
-            openness += baked.openness[k] * weight;
-            directions += baked.directions[k] * weight;
-        });
+        const float weights = points.add(position, side, openness, directions);
         if (weights == 0.0f) continue;
         tile.add_openness(pixel, openness * (places / weights), directions * (places / weights));
         return;
