@@ -196,7 +196,7 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             IceCore core = core_at(path, surface, static_cast<int>(surface.object), false);
             core.is_primary = path.bounce == 0;
-            add_entering_light(core, path, surface, *body);
+            note_entering(core, path, surface, *body, tile);
             if (!is_open || crossing.to == InsideOf::kNone) {
                 const float chord = core.is_primary ? chord_behind(surface, path.ray.direction, tile) : 0.0f;
                 core.drift *= body->drift_within(chord);
