@@ -68,7 +68,8 @@ struct PlaneFamily {
         const float reach = 1.01f * (pattern.warp * pattern.size * kMostNoise +
                                      0.5f * (pattern.width + pattern.feather) + at.footprint);
         const float h = at.position.dot(normal), scale = 1.0f / pitch(pattern);
-        const int first = int(std::ceil((h - reach) * scale - kMostOffset)), last = int(std::floor((h + reach) * scale));
+        const int first = int(std::ceil((h - reach) * scale - kMostOffset)),
+                  last = int(std::floor((h + reach) * scale));
         if (last - first > kMostPlanes) return false;
         for (int i = first; i <= last; ++i) {
             if (std::abs(h - offset(pattern, i)) <= reach) return false;
@@ -105,7 +106,8 @@ const std::array<PlaneFamily, kPlaneFamilies>& plane_families(std::uint32_t seed
 }
 
 float fracture_mask(const Pattern& pattern, const PatternPoint& at) {
-    const float widest = 0.5f * (pattern.width + pattern.feather) + at.footprint;  // of a line, however the plane stands
+    const float widest =
+        0.5f * (pattern.width + pattern.feather) + at.footprint;  // of a line, however the plane stands
     float left = 1.0f;
     for (const PlaneFamily& planes : plane_families(pattern.seed)) {
         if (planes.is_clear_of(pattern, at)) continue;
