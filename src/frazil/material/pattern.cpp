@@ -193,16 +193,19 @@ float frost_mask(const Pattern& pattern, const PatternPoint& at) {
         bent += vector_noise(place, pattern.seed + 11U) * pattern.warp;
     }
     const float growth = fractal_noise(bent, octaves + 2, footprint, pattern.seed);
-    // Crystals: fine ridges within the growth.
-    const float fine = fractal_noise(bent * 6.0f, octaves, 6.0f * footprint, pattern.seed + 50U);
     // What the footprint leaves out of the growth softens the edge; of the crystals it also leaves the mean of their folds.
     const float growth_variance = fractal_variance_left_out(octaves + 2, footprint);
     const float fine_variance = fractal_variance_left_out(octaves, 6.0f * footprint);
-    const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
-    const float level = 0.5f + 0.55f * growth + 0.18f * ridge + 0.5f * pattern.slope * facing(pattern, at);
     const float threshold = 1.15f - 1.1f * pattern.amount,
                 left_out = 0.55f * 0.55f * growth_variance + 0.36f * 0.36f * (1.0f - kFolded) * fine_variance;
-    return soft_step(threshold, 0.16f, left_out, level);
+    const float slope = 0.5f * pattern.slope * facing(pattern, at);
+    const auto mask = [&](float fine) {
+        const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
+        return soft_step(threshold, 0.16f, left_out, 0.5f + 0.55f * growth + 0.18f * ridge + slope);
+    };
+    // Crystals: fine ridges within the growth, where their crests would reach.
+    if (mask(0.0f) == 0.0f) return 0.0f;
+    return mask(fractal_noise(bent * 6.0f, octaves, 6.0f * footprint, pattern.seed + 50U));
 }
 
 float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
@@ -245,11 +248,13 @@ float bands_mask(const Pattern& pattern, const PatternPoint& at) {
             fractal_noise(at.position / (4.0f * pattern.size), 4, at.footprint / (4.0f * pattern.size), pattern.seed);
     }
     const int nearest = int(std::floor(height / pattern.size));
+    const float widest = 0.86f * pattern.width + 0.5f * pattern.feather + at.footprint;
     float left = 1.0f;
     for (int i = nearest - 1; i <= nearest + 1; ++i) {
         const std::uint32_t h = hash(pattern.seed, std::uint32_t(i), 9U);
         if (to_unit_float(h) > pattern.amount) continue;
         const float middle = (float(i) + to_unit_float(hash(h))) * pattern.size;
+        if (std::abs(height - middle) > widest) continue;
         const float width = pattern.width * (0.3f + 1.4f * to_unit_float(hash(h, 2U)));
         const float line =
             line_mask(along_surface(std::abs(height - middle), axis, at.normal), width, pattern.feather, at.footprint);

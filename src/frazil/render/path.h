@@ -76,6 +76,7 @@ class PathTracer {
     // Ice: entering it, going on inside, meeting its boundary from inside. False where the path ends.
     // The light of a body's core at its surface, seen from outside or from inside.
     IceCore core_at(const Path& path, const Surface& surface, int body, bool from_inside) const;
+    float sight(const Path& path) const;
     float chord_behind(const Surface& surface, const V3f& direction, Tile& tile) const;
     bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const IceCore& core,
                Sampler& sampler) const;

@@ -145,10 +145,12 @@ class Tile {
         count_id(objects_[seen_through ? hits_.size() + pixel : pixel], object, samples);
     }
 
-    void add_primary(std::size_t pixel, const PrimaryHit& hit) {
+    // Count a sample that shows something; whether that is nearer than all before.
+    bool add_hit(std::size_t pixel, float depth) {
         ++hits_[pixel];
-        if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
+        return depth < nearest_[pixel].depth;
     }
+    void set_nearest(std::size_t pixel, const PrimaryHit& hit) { nearest_[pixel] = hit; }
 
     // What shading finds where a sample sees a surface, for as many samples as it stands for.
     void add_shaded(std::size_t pixel, const V3f& normal, const Rgb& albedo, float samples) {
