@@ -162,8 +162,9 @@ Gathering::Answers Gathering::answers_for(const Body& body, Requests requests, c
 void Gathering::ask_entering_light(const Body& body, Requests requests, const Answers& answers,
                                    const Tile& tile) const {
     Compensation fill = body.material->compensation;
-    if (layout_.needs_fill()) fill.mode = CompensationMode::fill, fill.strength = 1.0f;
-    if (fill.mode != CompensationMode::fill) return;
+    if (fill.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+    // At full strength, so that a layer asks for the same as a render with this compensation.
+    fill.mode = CompensationMode::fill, fill.strength = 1.0f;
     std::vector<const EnteringPlace*> places;
     std::vector<GatherRequest*> asking;
     std::vector<float> counts;
