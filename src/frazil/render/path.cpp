@@ -37,7 +37,7 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
 void PathTracer::see(std::span<const Ray> camera_rays, std::vector<FirstHit>& seen, Tile& tile) const {
     thread_local std::vector<Hit> hits;
     hits.resize(camera_rays.size());
-    ray_scene_.intersect(camera_rays, hits);
+    ray_scene_.intersect(camera_rays, hits, nullptr, true);
     tile.rays += camera_rays.size();
     seen.assign(camera_rays.size(), {});
     for (std::size_t i = 0; i < seen.size(); ++i) {
