@@ -77,7 +77,11 @@ struct LayeredBall {
                 request.depth = 0.0f;
             }
             (sees_itself ? request.translucency : request.refraction) = Rgb(0.3f, 0.2f, 0.1f);
-            if (sees_itself) request.overlays = {{layout.overlay_plane(0), Rgb(0.1f), Rgb(-0.3f), Rgb(0.2f)}};
+            if (sees_itself) {
+                request.first_overlay = std::uint32_t(tile.overlays.size());
+                request.overlay_count = 1;
+                tile.overlays.push_back({layout.overlay_plane(0), Rgb(0.1f), Rgb(-0.3f), Rgb(0.2f)});
+            }
             request.entering = Rgb(0.2f);
             tile.requests.push_back(request);
         }

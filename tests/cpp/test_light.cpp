@@ -1,6 +1,7 @@
 // Light samplers: density, agreement of sample() and intersect(), choice among lights, refusals.
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 
 #include "chi_square.h"
@@ -253,6 +254,37 @@ TEST_CASE("light sampler: pdf holds the pick, unbiased over lights of all kinds;
         }
     }
     CHECK(picked / kCount == doctest::Approx(expected / kCount).epsilon(0.01));
+}
+
+TEST_CASE("light sampler: many receivers at once get what each gets alone") {
+    M44f up;
+    up.setTranslation(V3f(0, 0, 2));
+    std::vector<Light> lights{make_light(RectLight{}, up), make_light(DomeLight{sky_with_sun()}),
+                              make_light(DistantLight{30.0f})};
+    lights[1].multipliers[int(LightComponent::translucency)] = 0.5f;
+    const LightSampler sampler(lights);
+    std::vector<LightReceiver> receivers;
+    std::vector<float> u_pick;
+    std::vector<V2f> u;
+    for (std::uint32_t i = 0; i < 301; ++i) {
+        Sampler random(3, 1, i);
+        receivers.push_back({V3f(0.01f * float(i), 0.1f, 0.0f), V3f(0, 0, 1), 0});
+        u_pick.push_back(random.next_1d());
+        u.push_back(random.next_2d());
+    }
+    std::vector<LightSample> together(receivers.size());
+    sampler.sample_many(receivers, u_pick, u, together, LightUse::translucency);
+    std::array<int, 3> of_light{};
+    for (std::size_t i = 0; i < receivers.size(); ++i) {
+        const LightSample alone = sampler.sample(receivers[i], u_pick[i], u[i], LightUse::translucency);
+        REQUIRE(together[i].light == alone.light);
+        CHECK(together[i].direction == alone.direction);
+        CHECK(together[i].radiance == alone.radiance);
+        CHECK(together[i].pdf == alone.pdf);
+        CHECK(together[i].distance == alone.distance);
+        ++of_light[std::size_t(alone.light)];
+    }
+    for (const int count : of_light) CHECK(count > 10);
 }
 
 TEST_CASE("light sampler: lights without a share are never picked; parallel light is a delta") {

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "frazil/base/error.h"
@@ -204,14 +205,16 @@ TEST_CASE("fracture planes inside are seen through refraction, along a ray where
     pattern.amount = 1.0f;
     pattern.warp = 0.3f;
     const V3f origin(0.1f, 0.2f, 0.3f), direction = V3f(0.3f, -0.6f, 0.7f).normalized();
-    float begin = 1e-3f, t = 0.0f, mask = 0.0f;
+    FractureRay ray{origin, direction, 1e-3f, 3.0f};
+    Sampler coins(1, 0, 0);
+    float t = 0.0f;
     V3f normal;
     int found = 0;
-    while (next_fracture(pattern, origin, direction, begin, 3.0f, 0.0f, t, mask, normal)) {
-        REQUIRE(t > begin);
+    while (find_fracture(pattern, 1.0f, ray, coins, t, normal)) {
+        REQUIRE(t > ray.t_min);
         // In space, across the sheet, the pattern has a line there.
         CHECK(eval_pattern(pattern, {origin + direction * t, V3f(0.0f), 0.0f}) > 0.5f);
-        begin = t + 1e-4f;
+        ray.t_min = t + 1e-4f;
         ++found;
     }
     CHECK(found >= 4);
@@ -229,6 +232,46 @@ TEST_CASE("fracture planes inside are seen through refraction, along a ray where
     sheets.pattern = pattern;
     std::get<IceMaterial>(scene.materials[0].model).overlays = {sheets};
     CHECK(mean_inside(render(scene, small()).film, "refraction", 0) < 0.3 * clear);
+}
+
+TEST_CASE("each fracture plane along a ray stops it by the chance of its mask and the opacity") {
+    Pattern pattern = pattern_of(PatternKind::fracture);
+    pattern.warp = 0.3f;
+    pattern.width = 0.02f;  // lines that are full where a bent plane is met, but for a millimetre
+    constexpr float kOpacity = 0.4f;
+    constexpr int kDraws = 4096;
+    FractureRay ray{V3f(0.1f, 0.2f, 0.3f), V3f(0.3f, -0.6f, 0.7f).normalized(), 1e-3f, 3.0f};
+    for (const float amount : {1.0f, 0.5f}) {
+        pattern.amount = amount;
+        // Where there are planes, from the mask in space.
+        std::vector<double> places, masks;
+        Pattern whole = pattern;
+        whole.amount = 1.0f;
+        Sampler any(1, 0, 0);
+        float t = 0.0f;
+        V3f normal;
+        for (FractureRay rest = ray; find_fracture(whole, 1.0f, rest, any, t, normal); rest.t_min = t + 1e-4f) {
+            places.push_back(t);
+            masks.push_back(eval_pattern(pattern, {ray.origin + ray.direction * t, V3f(0.0f), 0.0f}));
+        }
+        std::vector<double> stopped(places.size(), 0.0);
+        for (int draw = 0; draw < kDraws; ++draw) {
+            Sampler coins(7, 0, std::uint32_t(draw));
+            if (!find_fracture(pattern, kOpacity, ray, coins, t, normal)) continue;
+            const auto nearest = std::min_element(places.begin(), places.end(), [&](double a, double b) {
+                return std::abs(a - double(t)) < std::abs(b - double(t));
+            });
+            stopped[std::size_t(nearest - places.begin())] += 1.0 / kDraws;
+        }
+        double left = 1.0;
+        for (std::size_t k = 0; k < places.size(); ++k) {
+            CAPTURE(amount);
+            CAPTURE(k);
+            CHECK(stopped[k] == doctest::Approx(left * masks[k] * double(kOpacity)).epsilon(0.02).scale(1.0));
+            left *= 1.0 - masks[k] * double(kOpacity);
+        }
+        CHECK(left < (amount < 1.0f ? 0.95 : 0.5));
+    }
 }
 
 TEST_CASE("overlays out of range are refused by name") {

@@ -1,5 +1,6 @@
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include "frazil/render/translucency_sets.h"
 #include "scenes.h"
 
@@ -89,8 +90,11 @@ TEST_CASE("a sphere cut into two overlapping parts of one translucency set is on
     // Points inside are left out: those of both parts together are as many as the sphere's, not a half more.
     CHECK(double(two.stats.points) == doctest::Approx(double(one.stats.points)).epsilon(0.03));
     CHECK(double(apart.stats.points) > 1.3 * double(one.stats.points));
-    CHECK(difference(one.film, two.film, "translucency") < 0.02);
-    CHECK(difference(one.film, apart.film, "translucency") > 0.04);
+    // Where both surfaces lie in one place, which of them a ray meets is the tracer's: of parts that stand apart it decides
+    // how far off they are.
+    const double off = difference(one.film, two.film, "translucency");
+    CHECK(off < 0.02);
+    CHECK(difference(one.film, apart.film, "translucency") > std::max(0.03, 10.0 * off));
 
     SUBCASE("seen into, too: the inner boundaries are invisible") {
         options.samples = 256;

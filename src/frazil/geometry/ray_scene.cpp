@@ -311,18 +311,21 @@ void RayScene::are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> o
     });
 }
 
-void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits, PlacementMask mask) const {
+void RayScene::intersect(std::span<const Ray> rays, std::span<Hit> hits, PlacementMask mask, bool are_alike) const {
     FilteredContext context(impl_->placement_of_geometry, mask);
 #if FRAZIL_EMBREE_MAJOR >= 4
     RTCIntersectArguments arguments;
     rtcInitIntersectArguments(&arguments);
+    int flags = are_alike ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
     if (mask) {
         arguments.context = &context.embree;
         arguments.filter = &FilteredContext::reject_unmasked;
-        arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+        flags |= RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
     }
+    arguments.flags = static_cast<RTCRayQueryFlags>(flags);
 #else
     if (!mask) context.embree.filter = nullptr;
+    if (are_alike) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 #endif
     for_each_packet(rays, [&](const std::uint32_t* index, std::size_t count) {
         alignas(32) int valid[kPacket];

@@ -78,7 +78,9 @@ class RayScene {
     // The same for many rays at once, out[i] 1 or 0, and hits[i].t infinite where there is none. Rays of like direction are traced
     // together: faster the more there are and the nearer those that follow one another start.
     void are_occluded(std::span<const Ray> rays, std::span<std::uint8_t> out) const;
-    void intersect(std::span<const Ray> rays, std::span<Hit> hits, PlacementMask mask = nullptr) const;
+    // `are_alike`: rays that follow one another go nearly the same way, as a pixel's.
+    void intersect(std::span<const Ray> rays, std::span<Hit> hits, PlacementMask mask = nullptr,
+                   bool are_alike = false) const;
 
     // The same among some of the placements.
     bool intersect(const Ray& ray, Hit& hit, PlacementMask mask) const;

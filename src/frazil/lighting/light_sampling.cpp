@@ -104,6 +104,37 @@ LightSample LightSampler::sample(const LightReceiver& receiver, float u_pick, co
     return sample;
 }
 
+void LightSampler::sample_many(std::span<const LightReceiver> receivers, std::span<const float> u_pick,
+                               std::span<const V2f> u, std::span<LightSample> out, LightUse use) const {
+    std::vector<LightPick> picks;
+    for (std::size_t i = 0; i < receivers.size(); ++i) picks.push_back(pick(receivers[i], u_pick[i], use));
+    std::vector<V2f> u_dome;
+    std::vector<LightSample> of_dome;
+    for (std::size_t light = 0; light < lights_.size(); ++light) {
+        if (!world_light(int(light)).is_same_everywhere()) continue;
+        u_dome.clear();
+        for (std::size_t i = 0; i < picks.size(); ++i) {
+            if (picks[i].light == int(light)) u_dome.push_back(u[i]);
+        }
+        if (u_dome.empty()) continue;
+        of_dome.resize(u_dome.size());
+        sample_many(int(light), receivers.front().position, u_dome, of_dome);
+        for (std::size_t i = 0, k = 0; i < picks.size(); ++i) {
+            if (picks[i].light == int(light)) out[i] = of_dome[k++];
+        }
+    }
+    for (std::size_t i = 0; i < picks.size(); ++i) {
+        if (picks[i].light < 0) {
+            out[i] = {};
+            continue;
+        }
+        if (!world_light(picks[i].light).is_same_everywhere()) {
+            out[i] = sample_one(picks[i].light, receivers[i].position, u[i]);
+        }
+        out[i].pdf *= picks[i].probability;
+    }
+}
+
 LightSample LightSampler::sample_one(int light, const V3f& position, const V2f& u) const {
     LightSample sample;
     sample_many(light, position, {&u, 1}, {&sample, 1});

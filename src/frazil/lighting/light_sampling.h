@@ -42,6 +42,9 @@ class LightSampler {
     // One direction for the receiver.
     LightSample sample(const LightReceiver& receiver, float u_pick, const V2f& u,
                        LightUse use = LightUse::surface) const;
+    // One direction for each of many receivers, as sample() has it: those towards a dome wait for memory together.
+    void sample_many(std::span<const LightReceiver> receivers, std::span<const float> u_pick, std::span<const V2f> u,
+                     std::span<LightSample> out, LightUse use = LightUse::surface) const;
     LightSample sample(const V3f& position, float u_pick, const V2f& u) const {
         return sample(LightReceiver{position, V3f(0.0f), kNoObject}, u_pick, u);
     }

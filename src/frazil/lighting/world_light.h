@@ -63,6 +63,8 @@ class WorldLight {
     bool is_finite() const { return !is_dome() && !std::holds_alternative<Distant>(shape_); }
 
     bool is_dome() const { return std::holds_alternative<Dome>(shape_); }
+    // Whether it sends every place the same: a dome without portals.
+    bool is_same_everywhere() const { return is_dome() && std::get<Dome>(shape_).portals.empty(); }
     // Whether a dome has portals that light may come through to the position.
     bool has_portal_before(const V3f& position) const;
     // A uniform dome: cosine-weighted directions serve it best.

@@ -186,7 +186,11 @@ CellWall nearest_cell_wall_here(const V3f& place, float reach, std::uint32_t see
     for (int r = 0; r < kRows; ++r) {
         if (side2(r) > best) continue;
         const Row& here = row(r);
-        for (int i = 0; i < kRow; ++i) {
+        bool is_better = false;
+        for (std::size_t i = 0; i < kRow; i += hn::Lanes(d)) {
+            is_better |= !hn::AllFalse(d, hn::Lt(hn::Load(d, here.distance2 + i), hn::Set(d, best)));
+        }
+        for (int i = 0; is_better && i < kRow; ++i) {
             if (here.distance2[i] < best) best = here.distance2[i], best_row = r, best_lane = i;
         }
     }

@@ -14,6 +14,7 @@ constexpr int kPlaneFamilies = 4;
 constexpr float kMostNoise = 1.5f;
 constexpr float kMostOffset = 0.7f;  // of a plane, in pitches
 constexpr int kMostPlanes = 6;       // of a family that are looked at one by one
+constexpr int kMostPlanesMet = 16;   // along a ray, of all families
 // Lines at a flat angle to the surface are widened no further than this.
 constexpr float kLeastSine = 0.25f;
 // Area of the walls between cells of unit size in a unit of volume, measured.
@@ -48,32 +49,14 @@ V3f family_normal(std::uint32_t seed, int family) {
     return {r * std::cos(phi), z, r * std::sin(phi)};
 }
 
-// Those of all families. Rays ask for the same few seeds over and over: each thread remembers some.
-const std::array<V3f, kPlaneFamilies>& family_normals(std::uint32_t seed) {
-    struct Known {
-        bool is_filled = false;
-        std::uint32_t seed = 0;
-        std::array<V3f, kPlaneFamilies> normals;
-    };
-    thread_local std::array<Known, 16> known;
-    Known& of_seed = known[hash(seed) % known.size()];
-    if (!of_seed.is_filled || of_seed.seed != seed) {
-        for (int family = 0; family < kPlaneFamilies; ++family)
-            of_seed.normals[std::size_t(family)] = family_normal(seed, family);
-        of_seed.seed = seed, of_seed.is_filled = true;
-    }
-    return of_seed.normals;
-}
-
 // Planes of one family stand `size` times the number of families apart, each moved at random, bent by smooth noise and cut
 // off where a noise of its own falls short.
 struct PlaneFamily {
-    PlaneFamily(const Pattern& pattern, int family)
-        : normal(family_normals(pattern.seed)[std::size_t(family)]),
-          pitch(pattern.size * kPlaneFamilies),
-          seed(hash(pattern.seed, std::uint32_t(family))) {}
-
-    float offset(int i) const { return (float(i) + kMostOffset * to_unit_float(hash(seed, std::uint32_t(i)))) * pitch; }
+    float pitch(const Pattern& pattern) const { return pattern.size * kPlaneFamilies; }
+    // Of the unbent plane i along the normal: 0 to kMostOffset pitches beyond i.
+    float offset(const Pattern& pattern, int i) const {
+        return (float(i) + kMostOffset * to_unit_float(hash(seed, std::uint32_t(i)))) * pitch(pattern);
+    }
     // The height over the unbent family, in metres.
     float height(const Pattern& pattern, const V3f& p) const {
         float h = p.dot(normal);
@@ -84,11 +67,12 @@ struct PlaneFamily {
     bool is_clear_of(const Pattern& pattern, const PatternPoint& at) const {
         const float reach = 1.01f * (pattern.warp * pattern.size * kMostNoise +
                                      0.5f * (pattern.width + pattern.feather) + at.footprint);
-        const float h = at.position.dot(normal);
-        const int first = int(std::floor((h - reach) / pitch)) - 1, last = int(std::floor((h + reach) / pitch)) + 1;
+        const float h = at.position.dot(normal), scale = 1.0f / pitch(pattern);
+        const int first = int(std::ceil((h - reach) * scale - kMostOffset)),
+                  last = int(std::floor((h + reach) * scale));
         if (last - first > kMostPlanes) return false;
         for (int i = first; i <= last; ++i) {
-            if (std::abs(h - offset(i)) <= reach) return false;
+            if (std::abs(h - offset(pattern, i)) <= reach) return false;
         }
         return true;
     }
@@ -100,20 +84,39 @@ struct PlaneFamily {
         return smooth_step(1.0f - pattern.amount - 0.04f, 1.0f - pattern.amount + 0.12f, n);
     }
 
-    V3f normal;
-    float pitch;
-    std::uint32_t seed;
+    V3f normal = V3f(0.0f);
+    std::uint32_t seed = 0;
 };
 
+// Rays ask for the same few seeds over and over: each thread remembers some.
+const std::array<PlaneFamily, kPlaneFamilies>& plane_families(std::uint32_t seed) {
+    struct Known {
+        bool is_filled = false;
+        std::uint32_t seed = 0;
+        std::array<PlaneFamily, kPlaneFamilies> families;
+    };
+    thread_local std::array<Known, 16> known;
+    Known& of_seed = known[hash(seed) % known.size()];
+    if (!of_seed.is_filled || of_seed.seed != seed) {
+        for (int family = 0; family < kPlaneFamilies; ++family)
+            of_seed.families[std::size_t(family)] = {family_normal(seed, family), hash(seed, std::uint32_t(family))};
+        of_seed.seed = seed, of_seed.is_filled = true;
+    }
+    return of_seed.families;
+}
+
 float fracture_mask(const Pattern& pattern, const PatternPoint& at) {
+    const float widest =
+        0.5f * (pattern.width + pattern.feather) + at.footprint;  // of a line, however the plane stands
     float left = 1.0f;
-    for (int family = 0; family < kPlaneFamilies; ++family) {
-        const PlaneFamily planes(pattern, family);
+    for (const PlaneFamily& planes : plane_families(pattern.seed)) {
         if (planes.is_clear_of(pattern, at)) continue;
         const float h = planes.height(pattern, at.position);
-        const int nearest = int(std::floor(h / planes.pitch));
+        const int nearest = int(std::floor(h / planes.pitch(pattern)));
         for (int i = nearest - 1; i <= nearest + 1; ++i) {
-            const float distance = along_surface(std::abs(h - planes.offset(i)), planes.normal, at.normal);
+            const float away = std::abs(h - planes.offset(pattern, i));
+            if (away > widest) continue;
+            const float distance = along_surface(away, planes.normal, at.normal);
             const float line = line_mask(distance, pattern.width, pattern.feather, at.footprint);
             if (line > 0.0f) left *= 1.0f - line * planes.extent(pattern, at.position, i, at.footprint);
         }
@@ -190,16 +193,19 @@ float frost_mask(const Pattern& pattern, const PatternPoint& at) {
         bent += vector_noise(place, pattern.seed + 11U) * pattern.warp;
     }
     const float growth = fractal_noise(bent, octaves + 2, footprint, pattern.seed);
-    // Crystals: fine ridges within the growth.
-    const float fine = fractal_noise(bent * 6.0f, octaves, 6.0f * footprint, pattern.seed + 50U);
     // What the footprint leaves out of the growth softens the edge; of the crystals it also leaves the mean of their folds.
     const float growth_variance = fractal_variance_left_out(octaves + 2, footprint);
     const float fine_variance = fractal_variance_left_out(octaves, 6.0f * footprint);
-    const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
-    const float level = 0.5f + 0.55f * growth + 0.18f * ridge + 0.5f * pattern.slope * facing(pattern, at);
     const float threshold = 1.15f - 1.1f * pattern.amount,
                 left_out = 0.55f * 0.55f * growth_variance + 0.36f * 0.36f * (1.0f - kFolded) * fine_variance;
-    return soft_step(threshold, 0.16f, left_out, level);
+    const float slope = 0.5f * pattern.slope * facing(pattern, at);
+    const auto mask = [&](float fine) {
+        const float ridge = 1.0f - 2.0f * std::sqrt(fine * fine + kFolded * fine_variance);
+        return soft_step(threshold, 0.16f, left_out, 0.5f + 0.55f * growth + 0.18f * ridge + slope);
+    };
+    // Crystals: fine ridges within the growth, where their crests would reach.
+    if (mask(0.0f) == 0.0f) return 0.0f;
+    return mask(fractal_noise(bent * 6.0f, octaves, 6.0f * footprint, pattern.seed + 50U));
 }
 
 float bubbles_mask(const Pattern& pattern, const PatternPoint& at) {
@@ -242,11 +248,13 @@ float bands_mask(const Pattern& pattern, const PatternPoint& at) {
             fractal_noise(at.position / (4.0f * pattern.size), 4, at.footprint / (4.0f * pattern.size), pattern.seed);
     }
     const int nearest = int(std::floor(height / pattern.size));
+    const float widest = 0.86f * pattern.width + 0.5f * pattern.feather + at.footprint;
     float left = 1.0f;
     for (int i = nearest - 1; i <= nearest + 1; ++i) {
         const std::uint32_t h = hash(pattern.seed, std::uint32_t(i), 9U);
         if (to_unit_float(h) > pattern.amount) continue;
         const float middle = (float(i) + to_unit_float(hash(h))) * pattern.size;
+        if (std::abs(height - middle) > widest) continue;
         const float width = pattern.width * (0.3f + 1.4f * to_unit_float(hash(h, 2U)));
         const float line =
             line_mask(along_surface(std::abs(height - middle), axis, at.normal), width, pattern.feather, at.footprint);
@@ -297,35 +305,61 @@ float eval_pattern(const Pattern& pattern, const PatternPoint& point) {
     return 0.0f;
 }
 
-bool next_fracture(const Pattern& pattern, const V3f& origin, const V3f& direction, float t_min, float t_max,
-                   float footprint, float& t, float& mask, V3f& normal) {
-    bool is_found = false;
-    for (int family = 0; family < kPlaneFamilies; ++family) {
-        const PlaneFamily planes(pattern, family);
-        const float speed = direction.dot(planes.normal);
-        if (std::abs(speed) < 1e-3f) continue;
-        // A bent plane is met within so much of where a straight one would be.
-        const float margin = pattern.warp * pattern.size / std::abs(speed), base = origin.dot(planes.normal);
-        const int step = speed > 0.0f ? 1 : -1;
-        // The first that may be met: plane i stands 0 to kMostOffset pitches beyond i.
-        const float from = (base + speed * t_min) / planes.pitch,
-                    bend = pattern.warp * pattern.size / planes.pitch + 1e-3f;
-        const int first = int(std::floor(step > 0 ? from - bend - kMostOffset : from + bend)) + (step > 0 ? 1 : 0);
-        for (int k = 0; k < 64; ++k) {
-            const int i = first + step * k;
-            const float straight = (planes.offset(i) - base) / speed, limit = is_found ? t : t_max;
-            if (straight + margin <= t_min) continue;
-            if (straight - margin >= limit) break;
-            float s = straight;
-            for (int refine = 0; refine < (pattern.warp > 0.0f ? 4 : 0); ++refine) {
-                s += (planes.offset(i) - planes.height(pattern, origin + direction * s)) / speed;
-            }
-            if (s <= t_min || s >= limit) continue;
-            const float there = planes.extent(pattern, origin + direction * s, i, footprint);
-            if (there <= 0.0f) continue;
-            t = s, mask = there, normal = planes.normal, is_found = true;
-            break;
+bool find_fracture(const Pattern& pattern, float opacity, const FractureRay& ray, Sampler& coins, float& t,
+                   V3f& normal) {
+    // The planes of each family in their order along the ray; a bent one is met within `margin` of where it would be straight.
+    struct Walk {
+        const PlaneFamily* planes = nullptr;
+        float base = 0.0f, speed = 0.0f, margin = 0.0f;
+        int plane = 0, step = 1;
+        float straight = 0.0f;
+        float earliest() const { return straight - margin; }
+        void go_to(const Pattern& pattern, int i) {
+            plane = i;
+            straight = (planes->offset(pattern, i) - base) / speed;
         }
+    };
+    std::array<Walk, kPlaneFamilies> walks;
+    std::size_t count = 0;
+    const float bend = pattern.warp * pattern.size;
+    for (const PlaneFamily& planes : plane_families(pattern.seed)) {
+        Walk walk;
+        walk.planes = &planes;
+        walk.speed = ray.direction.dot(planes.normal);
+        if (std::abs(walk.speed) < 1e-3f) continue;
+        walk.base = ray.origin.dot(planes.normal);
+        walk.margin = bend / std::abs(walk.speed);
+        walk.step = walk.speed > 0.0f ? 1 : -1;
+        const float pitch = planes.pitch(pattern), from = (walk.base + walk.speed * ray.t_min) / pitch;
+        const float reach = bend / pitch + 1e-3f;
+        const int first = int(std::floor(walk.step > 0 ? from - reach - kMostOffset : from + reach));
+        walk.go_to(pattern, walk.step > 0 ? first + 1 : first);
+        while (walk.straight + walk.margin <= ray.t_min) walk.go_to(pattern, walk.plane + walk.step);
+        walks[count++] = walk;
+    }
+
+    // Every plane that may be met tosses its coin before it is looked at: most are not worth a noise.
+    bool is_found = false;
+    for (int k = 0; k < kMostPlanesMet && count > 0; ++k) {
+        Walk* walk = &walks[0];
+        for (std::size_t i = 1; i < count; ++i) {
+            if (walks[i].earliest() < walk->earliest()) walk = &walks[i];
+        }
+        const float limit = is_found ? t : ray.t_max;
+        if (walk->earliest() >= limit) break;
+        const PlaneFamily& planes = *walk->planes;
+        const int i = walk->plane;
+        const float straight = walk->straight, coin = coins.next_1d();
+        walk->go_to(pattern, i + walk->step);
+        if (coin >= opacity) continue;
+        float s = straight;
+        for (int refine = 0; refine < (pattern.warp > 0.0f ? 4 : 0); ++refine) {
+            s += (planes.offset(pattern, i) - planes.height(pattern, ray.origin + ray.direction * s)) / walk->speed;
+        }
+        if (s <= ray.t_min || s >= limit) continue;
+        const float there = planes.extent(pattern, ray.origin + ray.direction * s, i, ray.radius + ray.spread * s);
+        if (coin >= there * opacity) continue;
+        t = s, normal = planes.normal, is_found = true;
     }
     return is_found;
 }

@@ -8,6 +8,7 @@
 
 #include <string>
 
+#include "frazil/base/sampler.h"
 #include "frazil/material/noise.h"
 
 namespace frazil {
@@ -48,10 +49,17 @@ void check_pattern(const Pattern& pattern, const std::string& path);
 // The mask, 0..1.
 float eval_pattern(const Pattern& pattern, const PatternPoint& point);
 
-// The next fracture plane along a ray in rest space: its distance in (t_min, t_max) and the mask there; false where there
-// is none. Only for PatternKind::fracture; `normal` is the plane's.
-bool next_fracture(const Pattern& pattern, const V3f& origin, const V3f& direction, float t_min, float t_max,
-                   float footprint, float& t, float& mask, V3f& normal);
+// A ray in rest space, and the cone that it stands for.
+struct FractureRay {
+    V3f origin = V3f(0.0f), direction = V3f(0.0f);
+    float t_min = 0.0f, t_max = 0.0f;
+    float radius = 0.0f, spread = 0.0f;  // of the cone at the origin, and per metre
+};
+
+// The first fracture plane between t_min and t_max that stops the ray, each by the chance of its mask times `opacity`, and
+// its normal; false where none does. One number of `coins` a plane. Only for PatternKind::fracture.
+bool find_fracture(const Pattern& pattern, float opacity, const FractureRay& ray, Sampler& coins, float& t,
+                   V3f& normal);
 
 // The part of a line of full width `width`, at `distance` from its middle, that a footprint sees: exact for a box of
 // radius footprint + feather / 2.

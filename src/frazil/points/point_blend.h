@@ -29,14 +29,22 @@ class PointBlend {
     // where there is none.
     template <class Visit>
     float visit(const V3f& position, const V3f& normal, const Visit& visit) const {
+        return this->visit(position, normal, visit, [](std::uint32_t, std::uint32_t) {});
+    }
+    // The same; ahead(k, count) for runs of points before any is visited (PointLookup::visit).
+    template <class Visit, class Ahead>
+    float visit(const V3f& position, const V3f& normal, const Visit& visit, const Ahead& ahead) const {
         float sum = 0.0f;
-        lookup_.visit(position, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
-            const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
-            if (!(facing > 0.0f && q > 0.0f)) return;
-            const float weight = facing * q * q;
-            sum += weight;
-            visit(point, weight);
-        });
+        lookup_.visit(
+            position,
+            [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
+                const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
+                if (!(facing > 0.0f && q > 0.0f)) return;
+                const float weight = facing * q * q;
+                sum += weight;
+                visit(point, weight);
+            },
+            ahead);
         return sum;
     }
 

@@ -31,8 +31,13 @@ class PointLookup {
     std::vector<std::uint32_t> order() const;
 
     // visit(index, k, position, normal), once for every point within reach and for some beyond; index = order()[k].
+    // Before any, ahead(k, count) for each run of points that are about to be visited, so that their memory can be asked for.
+    template <class Visit, class Ahead>
+    void visit(const V3f& position, const Visit& visit, const Ahead& ahead) const;
     template <class Visit>
-    void visit(const V3f& position, const Visit& visit) const;
+    void visit(const V3f& position, const Visit& visit) const {
+        this->visit(position, visit, [](std::uint32_t, std::uint32_t) {});
+    }
 
   private:
     struct Entry {
@@ -71,8 +76,8 @@ class PointLookup {
     std::vector<V3f> normals_;          // in the same order
 };
 
-template <class Visit>
-void PointLookup::visit(const V3f& position, const Visit& visit) const {
+template <class Visit, class Ahead>
+void PointLookup::visit(const V3f& position, const Visit& visit, const Ahead& ahead) const {
     const At at = locate(position);
     std::array<std::uint32_t, 27> buckets;  // those that distant cells share are visited once
     std::size_t count = 0;
@@ -89,6 +94,7 @@ void PointLookup::visit(const V3f& position, const Visit& visit) const {
         if (first == first_[buckets[i] + 1]) continue;
         __builtin_prefetch(&entries_[first]);
         __builtin_prefetch(&normals_[first]);
+        ahead(first, first_[buckets[i] + 1] - first);
     }
     for (std::size_t i = 0; i < count; ++i) {
         for (std::uint32_t k = first_[buckets[i]]; k < first_[buckets[i] + 1]; ++k) {

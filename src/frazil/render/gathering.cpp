@@ -14,14 +14,10 @@ namespace {
 // of a mean free path the mean of places is inside thin tips, and half a percent off.
 constexpr float kCell = 0.5f;
 
-constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
+// The light that fills up is asked by chance where it brings less: of what a white diffuse surface in front of the camera gets.
+constexpr float kFaintFill = 0.005f;
 
-// What the requests of one body are answered with, and which row each takes.
-struct Answers {
-    CoreSums sums;
-    std::vector<std::uint32_t> row_of;
-    std::size_t gathers;  // the first rows; the others are blends
-};
+constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
 std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
     for (V3f& position : positions) position = position * matrix;
@@ -33,9 +29,7 @@ struct Places {
     std::vector<V3f> below, on_surface;
 };
 
-using Requests = std::span<const GatherRequest* const>;
-
-Places shared_places(Requests requests, float cell, std::vector<std::uint32_t>& row_of) {
+Places shared_places(std::span<GatherRequest* const> requests, float cell, std::vector<std::uint32_t>& row_of) {
     struct Key {
         std::uint64_t hash;
         std::uint32_t request;
@@ -62,34 +56,6 @@ Places shared_places(Requests requests, float cell, std::vector<std::uint32_t>& 
         places.on_surface.emplace_back(sum / double(end - begin));
     }
     return places;
-}
-
-// Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and those
-// of a lattice inside.
-Answers answers_for(const Body& body, Requests requests, const GatherOptions& options) {
-    std::vector<std::uint32_t> row_of(requests.size(), kNoRow), is_blended;
-    SumColumns columns;
-    if (body.at_points) {
-        columns = body.at_points->columns();
-        columns.overlays = body.trees.overlays ? body.overlay_layers.size() * columns.groups : 0;
-    }
-    CoreSums blended(columns);
-    for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
-        const GatherRequest& request = *requests[i];
-        if (request.is_primary) continue;
-        const V3f position = request.position * body.to_points;
-        V3f normal;
-        body.to_points.multDirMatrix(request.normal, normal);
-        if (!body.at_points->append(position, normal, blended)) body.inside->append(position, blended);
-        row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
-        is_blended.push_back(i);
-    }
-    const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
-    CoreSums sums =
-        gather_core(body.trees, moved(places.below, body.to_points), moved(places.on_surface, body.to_points), options);
-    sums.append(blended);
-    for (const std::uint32_t i : is_blended) row_of[i] += static_cast<std::uint32_t>(places.below.size());
-    return {std::move(sums), std::move(row_of), places.below.size()};
 }
 
 // What the sums of a place are scaled by, those below and those on the surface, to be exitance.
@@ -158,6 +124,71 @@ class Exitance {
 
 }  // namespace
 
+// What the requests of one body are answered with, and which row each takes.
+struct Gathering::Answers {
+    CoreSums sums;
+    std::vector<std::uint32_t> row_of;
+    std::size_t gathers;  // the first rows; the others are blends
+};
+
+Gathering::Answers Gathering::answers_for(const Body& body, Requests requests, const GatherOptions& options) {
+    std::vector<std::uint32_t> row_of(requests.size(), kNoRow), is_blended;
+    SumColumns columns;
+    if (body.at_points) {
+        columns = body.at_points->columns();
+        columns.overlays = body.trees.overlays ? body.overlay_layers.size() * columns.groups : 0;
+    }
+    CoreSums blended(columns);
+    for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
+        const GatherRequest& request = *requests[i];
+        if (request.is_primary) continue;
+        const V3f position = request.position * body.to_points;
+        V3f normal;
+        body.to_points.multDirMatrix(request.normal, normal);
+        if (!body.at_points->append(position, normal, blended)) body.inside->append(position, blended);
+        row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
+        is_blended.push_back(i);
+    }
+    const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
+    CoreSums sums =
+        gather_core(body.trees, moved(places.below, body.to_points), moved(places.on_surface, body.to_points), options);
+    sums.append(blended);
+    for (const std::uint32_t i : is_blended) row_of[i] += static_cast<std::uint32_t>(places.below.size());
+    return {std::move(sums), std::move(row_of), places.below.size()};
+}
+
+// Estimate the light that enters at the requests' places, where it fills up anything. What brings less than a white diffuse
+// surface's part of it is asked by chance.
+void Gathering::ask_entering_light(const Body& body, Requests requests, const Answers& answers,
+                                   const Tile& tile) const {
+    Compensation fill = body.material->compensation;
+    if (fill.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+    // At full strength, so that a layer asks for the same as a render with this compensation.
+    fill.mode = CompensationMode::fill, fill.strength = 1.0f;
+    std::vector<const EnteringPlace*> places;
+    std::vector<GatherRequest*> asking;
+    std::vector<float> counts;
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+        GatherRequest& request = *requests[i];
+        if (request.entering_place == GatherRequest::kNowhere) continue;
+        const EnteringPlace& place = tile.entering_places[request.entering_place];
+        const Rgb& coverage = answers.sums.on_surface(answers.row_of[i]).coverage();
+        const Rgb weight = request.translucency + request.diffuse + request.specular + request.refraction;
+        const float brought =
+            max_component(fill_amount(fill, coverage, body.total_reflectance) * weight) * (kPi / request.samples);
+        if (!(place.u_ask * kFaintFill < brought)) continue;
+        places.push_back(&place);
+        asking.push_back(&request);
+        counts.push_back(std::max(1.0f, kFaintFill / brought));
+    }
+    std::vector<Entering> entering(places.size());
+    entering_light_->sample(places, entering);
+    for (std::size_t k = 0; k < asking.size(); ++k) {
+        asking[k]->entering = entering[k].irradiance * counts[k];
+        asking[k]->entering_group = entering[k].group;
+    }
+}
+
 struct Gathering::Answer {
     const Exitance& exitance;
     const Scales& rendered;
@@ -165,9 +196,9 @@ struct Gathering::Answer {
 
 void Gathering::answer(const GatherOptions& options, Tile& tile) const {
     // One gather per body: requests grouped by object, in their own order.
-    std::vector<const GatherRequest*> requests;
+    std::vector<GatherRequest*> requests;
     requests.reserve(tile.requests.size());
-    for (const GatherRequest& request : tile.requests) requests.push_back(&request);
+    for (GatherRequest& request : tile.requests) requests.push_back(&request);
     std::stable_sort(requests.begin(), requests.end(),
                      [](const GatherRequest* a, const GatherRequest* b) { return a->object < b->object; });
     for (std::size_t begin = 0; begin < requests.size();) {
@@ -176,8 +207,10 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         while (end < requests.size() && requests[end]->object == requests[begin]->object) ++end;
         GatherOptions with_layers = options;
         with_layers.ramp_layers = !layout_.knots.empty() && !body.material->ramp.is_empty();
-        const Answers answers = answers_for(body, Requests(requests).subspan(begin, end - begin), with_layers);
+        const Requests of_body = Requests(requests).subspan(begin, end - begin);
+        const Answers answers = answers_for(body, of_body, with_layers);
         tile.gathers += answers.gathers;
+        if (entering_light_) ask_entering_light(body, of_body, answers, tile);
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = *requests[i];
@@ -223,15 +256,17 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
         begin = end;
     }
     tile.requests.clear();
+    tile.overlays.clear();
+    tile.entering_places.clear();
 }
 
 // What a change of each overlay's opacity adds to light that came by way of it.
 void Gathering::add_overlays(const GatherRequest& request, const Answer& answer, const Rgb& fill, Tile& tile) const {
     const Exitance& exitance = answer.exitance;
     const bool is_taken_from = request.is_primary && exitance.overlays();
-    if (request.overlays.empty() && !is_taken_from) return;
+    if (request.overlay_count == 0 && !is_taken_from) return;
     const Rgb gain = exitance.gain_below(answer.rendered);
-    for (const GatherRequest::Overlay& overlay : request.overlays) {
+    for (const GatherRequest::Overlay& overlay : tile.overlays_of(request)) {
         for (std::size_t group = 0; group < exitance.groups(); ++group) {
             Rgb light = exitance.below(group) * gain;
             if (group == request.entering_group) light += fill;
@@ -254,7 +289,7 @@ void Gathering::add_taken(const GatherRequest& request, const Answer& answer, co
     for (std::size_t k = 0; k < layers.size(); ++k) {
         const std::size_t plane = layout_.overlay_plane(layers[k]);
         Rgb here(0.0f);  // the overlay's own change of what comes from the core
-        for (const GatherRequest::Overlay& overlay : request.overlays) {
+        for (const GatherRequest::Overlay& overlay : tile.overlays_of(request)) {
             if (overlay.plane == plane) here = overlay.core;
         }
         for (std::size_t group = 0; group < groups; ++group) {

@@ -8,9 +8,11 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "frazil/render/bodies.h"
+#include "frazil/render/entering_light.h"
 #include "frazil/render/film_layout.h"
 #include "frazil/render/tile.h"
 
@@ -18,15 +20,23 @@ namespace frazil {
 
 class Gathering {
   public:
-    // Everything must outlive this.
-    Gathering(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies, const FilmLayout& layout)
-        : scene_(scene), bodies_(bodies), layout_(layout) {}
+    // Everything must outlive this. Without `entering_light` requests bring what enters with them.
+    Gathering(const Scene& scene, const std::vector<std::unique_ptr<Body>>& bodies, const FilmLayout& layout,
+              const EnteringLight* entering_light = nullptr)
+        : scene_(scene), bodies_(bodies), layout_(layout), entering_light_(entering_light) {}
 
     // Answer the tile's requests and forget them.
     void answer(const GatherOptions& options, Tile& tile) const;
 
   private:
     struct Answer;
+    struct Answers;
+    using Requests = std::span<GatherRequest* const>;
+
+    // Gather where the camera sees the body itself; blend the gathers at its points, where there are any, for the rest, and
+    // those of a lattice inside.
+    static Answers answers_for(const Body& body, Requests requests, const GatherOptions& options);
+    void ask_entering_light(const Body& body, Requests requests, const Answers& answers, const Tile& tile) const;
     void add_planes(const GatherRequest& request, const Rgb& weight, std::size_t base, const Answer& answer,
                     Tile& tile) const;
 
@@ -36,6 +46,7 @@ class Gathering {
     const Scene& scene_;
     const std::vector<std::unique_ptr<Body>>& bodies_;
     const FilmLayout& layout_;
+    const EnteringLight* entering_light_;
 };
 
 }  // namespace frazil

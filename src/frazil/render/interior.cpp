@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <optional>
@@ -161,6 +162,12 @@ Interiors::Depth Interiors::depth(int body, const Ray& ray, float length) const 
     return {depth, (1.0f - part) * length + part * depth};
 }
 
+float Interiors::scattering_depth(int body) const {
+    constexpr float kDepth = 8.0f;  // in free paths of the clearest channel
+    const Rgb& sigma = bodies_[std::size_t(body)]->material->medium.sigma_s_prime;
+    return kDepth / std::max(std::min(sigma.x, std::min(sigma.y, sigma.z)), 1e-6f);
+}
+
 int Interiors::filling(const InsideOf& inside) const {
     int best = InsideOf::kNone, priority = 0;
     for (int i = 0; i < inside.size(); ++i) {
@@ -248,10 +255,23 @@ Rgb Interiors::visibility(const Ray& ray, InsideOf inside, std::uint64_t& rays, 
         }
     };
     for (int crossings = 0; crossings < kMostCrossings; ++crossings) {
+        const int body = filling(inside);
+        // From so far inside ice nothing would go on: by the coin that is tossed next.
+        Ray within = rest;
+        if (body != InsideOf::kNone && !density(body)) {
+            const Medium& medium = bodies_[std::size_t(body)]->material->medium;
+            const Rgb sigma = medium.sigma_s_prime + (absorbs ? medium.sigma_a : Rgb(0.0f));
+            const float least = std::min(sigma.x, std::min(sigma.y, sigma.z));
+            const float wanted = std::max(kNothing, kFaint * to_unit_float(hash(coin)));
+            if (least > 0.0f) {
+                within.t_max = std::min(rest.t_max, std::log(max_component(result) / wanted) / least);
+                if (!(within.t_max > 0.0f)) return Rgb(0.0f);
+            }
+        }
         Hit hit;
         ++rays;
-        const bool is_hit = ray_scene_.intersect(rest, hit);
-        const int body = filling(inside);
+        const bool is_hit = ray_scene_.intersect(within, hit);
+        if (!is_hit && within.t_max < rest.t_max) return Rgb(0.0f);
         if (body != InsideOf::kNone) {
             const Medium& medium = bodies_[std::size_t(body)]->material->medium;
             const Depth through = depth(body, rest, is_hit ? hit.t : rest.t_max);

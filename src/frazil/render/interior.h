@@ -75,6 +75,8 @@ class Interiors {
     }
     const TransmissionAlbedo& transmission(int body) const { return *transmission_[std::size_t(body)]; }
 
+    // Metres of a body's medium beyond which all light of any channel counts as scattered.
+    float scattering_depth(int body) const;
     // What of its medium a way through a body holds; `ray` of unit direction, from its origin.
     struct Depth {
         float scattering, absorption;  // metres

@@ -86,8 +86,10 @@ Openness::Openness(const std::vector<LitPoints>& lit, const RayScene& scene, int
 }
 
 void Openness::answer(Tile& tile) const {
-    std::stable_sort(tile.places.begin(), tile.places.end(),
-                     [](const SeenPlace& a, const SeenPlace& b) { return a.object < b.object; });
+    const auto by_object = [](const SeenPlace& a, const SeenPlace& b) { return a.object < b.object; };
+    if (!std::is_sorted(tile.places.begin(), tile.places.end(), by_object)) {
+        std::stable_sort(tile.places.begin(), tile.places.end(), by_object);
+    }
     for (std::size_t begin = 0, end = 0; begin < tile.places.size(); begin = end) {
         const std::uint32_t object = tile.places[begin].object;
         while (end < tile.places.size() && tile.places[end].object == object) ++end;
@@ -118,8 +120,12 @@ void Openness::blend(const Points& points, std::span<const SeenPlace> places, Ti
         const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
         keys.push_back({std::uint64_t(places[i].pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
     }
-    std::sort(keys.begin(), keys.end(),
-              [](const Key& a, const Key& b) { return a.cell != b.cell ? a.cell < b.cell : a.place < b.place; });
+    // Pixel by pixel: their places lie side by side.
+    for (auto first = keys.begin(), last = first; first != keys.end(); first = last) {
+        last = std::find_if(first, keys.end(), [&](const Key& key) { return key.cell >> 32 != first->cell >> 32; });
+        std::sort(first, last,
+                  [](const Key& a, const Key& b) { return a.cell != b.cell ? a.cell < b.cell : a.place < b.place; });
+    }
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
         while (end < keys.size() && keys[end].cell == keys[begin].cell) ++end;
         std::size_t left = end;

@@ -37,7 +37,7 @@ PathTracer::PathTracer(const Scene& scene, const RayScene& ray_scene, const Ligh
 void PathTracer::see(std::span<const Ray> camera_rays, std::vector<FirstHit>& seen, Tile& tile) const {
     thread_local std::vector<Hit> hits;
     hits.resize(camera_rays.size());
-    ray_scene_.intersect(camera_rays, hits);
+    ray_scene_.intersect(camera_rays, hits, nullptr, true);
     tile.rays += camera_rays.size();
     seen.assign(camera_rays.size(), {});
     for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -61,8 +61,10 @@ void PathTracer::note_first(FirstHit& first, const V3f& view_axis, const Sampler
 // What a sample shows first, as far as shading has no part in it.
 void PathTracer::note(const Hit& hit, const Surface& surface, float depth, const Sampler& sampler, std::uint32_t pixel,
                       Tile& tile) const {
-    tile.add_primary(pixel, {depth, surface.position, surface.object + 1, surface.st, surface.local_position,
-                             motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
+    if (tile.add_hit(pixel, depth)) {
+        tile.set_nearest(pixel, {depth, surface.position, surface.object + 1, surface.st, surface.local_position,
+                                 motion_ ? motion_->of_hit(hit) : V2f(0.0f)});
+    }
     if (tile.keeps_places) {
         Sampler own = sampler;
         own.set_dimension(kOpennessDimensions);
@@ -115,7 +117,9 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             first = nullptr;
         } else {
             ++tile.rays;
-            is_hit = ray_scene_.intersect(path.ray, hit);
+            Ray ray = path.ray;
+            ray.t_max = std::min(ray.t_max, sight(path));
+            is_hit = ray_scene_.intersect(ray, hit);
         }
         float length = is_hit ? hit.t : std::numeric_limits<float>::infinity();
         path.begin_vertex();
@@ -196,7 +200,7 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             const float leaving = body->transmittance(surface.normal.dot(wo), surface.covering.roughness);
             IceCore core = core_at(path, surface, static_cast<int>(surface.object), false);
             core.is_primary = path.bounce == 0;
-            add_entering_light(core, path, surface, *body);
+            note_entering(core, path, surface, *body, tile);
             if (!is_open || crossing.to == InsideOf::kNone) {
                 const float chord = core.is_primary ? chord_behind(surface, path.ray.direction, tile) : 0.0f;
                 core.drift *= body->drift_within(chord);
@@ -225,6 +229,15 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
         if (!reflect(path, surface, shader, wo, reflection_odds)) return;
         split = nullptr;
     }
+}
+
+// How far is worth looking for what the path meets next: light that is scattered before is the core's.
+float PathTracer::sight(const Path& path) const {
+    const int body = interiors_.filling(path.inside);
+    if (body == InsideOf::kNone || path.volume > 0.0f || interiors_.density(body)) {
+        return std::numeric_limits<float>::infinity();
+    }
+    return interiors_.scattering_depth(body);
 }
 
 // How far a ray goes straight on behind a surface.

@@ -76,6 +76,7 @@ class PathTracer {
     // Ice: entering it, going on inside, meeting its boundary from inside. False where the path ends.
     // The light of a body's core at its surface, seen from outside or from inside.
     IceCore core_at(const Path& path, const Surface& surface, int body, bool from_inside) const;
+    float sight(const Path& path) const;
     float chord_behind(const Surface& surface, const V3f& direction, Tile& tile) const;
     bool enter(Path& path, const Surface& surface, const Crossing& crossing, float odds, const IceCore& core,
                Sampler& sampler) const;
@@ -87,7 +88,7 @@ class PathTracer {
     // What is seen through ice, by refraction alone: `share` of the path's weight ends at the object.
     void add_matte(const Path& path, std::size_t object, const Rgb& share, Tile& tile) const;
     void request_gather(const Path& path, const IceCore& core, const Rgb& share, Tile& tile) const;
-    void add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const;
+    void note_entering(IceCore& core, const Path& path, const Surface& surface, const Body& body, Tile& tile) const;
     // What light path expressions keep.
     void add_lpes_of_light(const Path& path, const Rgb& lobes, int light, const Rgb& radiance, Tile& tile) const;
     void add_lpes_beyond(const Path& path, LpeKind kind, std::size_t object, int light, const Rgb& radiance,

@@ -195,8 +195,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.depth = core.depth;
     request.is_primary = core.is_primary;
     request.samples = path.samples;
-    request.entering = core.entering;
-    request.entering_group = core.entering_group;
+    request.entering_place = core.entering_place;
     Scattering weights = path.weights();
     weights.scale(core.radiance_per_exitance * share * body.core_scale);
     request.diffuse = weights.diffuse;
@@ -209,11 +208,13 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         if (state == LpeAutomaton::kDead) continue;
         request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
     }
+    request.first_overlay = static_cast<std::uint32_t>(tile.overlays.size());
     for (const OverlayShare& overlay : path.overlays) {
         const std::size_t plane = layout_.overlay_plane(layout_.overlay_of[path.first_material][overlay.overlay]);
         const Rgb of_core = core.is_entered ? change_of_core(overlay, share) : overlay.core;
-        request.overlays.push_back({plane, overlay.diffuse, of_core, overlay.seen_through});
+        tile.overlays.push_back({plane, overlay.diffuse, of_core, overlay.seen_through});
     }
+    request.overlay_count = static_cast<std::uint32_t>(path.overlays.size());
     tile.requests.push_back(std::move(request));
 }
 

@@ -208,24 +208,22 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light, radiance * lobe, tile);
 }
 
-void PathTracer::add_entering_light(IceCore& core, const Path& path, const Surface& surface, const Body& body) const {
-    const IceMaterial& ice = *body.material;
-    if (ice.compensation.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+// Note where light enters for the compensation that fills up: it is asked for once the gather tells how much that fills.
+void PathTracer::note_entering(IceCore& core, const Path& path, const Surface& surface, const Body& body,
+                               Tile& tile) const {
+    if (body.material->compensation.mode != CompensationMode::fill && !layout_.needs_fill()) return;
+    core.entering_place = static_cast<std::uint32_t>(tile.entering_places.size());
+    EnteringPlace& place = tile.entering_places.emplace_back();
+    place.object = surface.object;
+    place.position = surface.position, place.normal = surface.normal, place.geometric_normal = surface.geometric_normal;
+    place.roughness = surface.covering.roughness;
+    place.bare = 1.0f - surface.covering.scattered;
     // Numbers of its own: neither the mode nor a layer that is asked for may change another one.
     Sampler own = path.sampler;
     own.set_dimension(kFillDimensions + 4U * path.vertex);
-    const float u_pick = own.next_1d();
-    const LightReceiver receiver{surface.position, surface.geometric_normal, surface.object};
-    const LightSample sample = lights_.sample(receiver, u_pick, own.next_2d(), LightUse::translucency);
-    const float cosine = surface.normal.dot(sample.direction);
-    const Ray shadow{offset_origin(surface.position, surface.geometric_normal), sample.direction, 0.0f,
-                     sample.distance * (1.0f - 1e-4f)};
-    if (!(sample.pdf > 0.0f) || cosine <= 0.0f || surface.geometric_normal.dot(sample.direction) <= 0.0f) return;
-    const Light& light = lights_.lights()[std::size_t(sample.light)];
-    const Rgb entering = body.enters(cosine, surface.covering.roughness) * (1.0f - surface.covering.scattered);
-    core.entering = sample.radiance * shadow_factor(ray_scene_, lights_, sample.light, shadow) * entering *
-                    (multiplier(light, LightComponent::translucency) * cosine / sample.pdf);
-    core.entering_group = static_cast<std::uint32_t>(group_of_light_[std::size_t(sample.light)]);
+    place.u_pick = own.next_1d();
+    place.u = own.next_2d();
+    place.u_ask = own.next_1d();
 }
 
 // A light that the path ran into, its lobes weighted by the light's multipliers.

@@ -6,12 +6,6 @@
 #include "frazil/render/path_state.h"
 
 namespace frazil {
-namespace {
-
-constexpr int kMaxSheets = 8;  // looked at on one piece of a path
-
-}  // namespace
-
 // The first fracture plane inside ice that stops the path: each in turn by the chance of its opacity.
 bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& normal, Rgb& color) const {
     const int body = interiors_.filling(path.inside);
@@ -27,31 +21,22 @@ bool PathTracer::find_sheet(const Path& path, float length, float& t, V3f& norma
                         : density ? length
                                   : std::min(length, deepest);
     const auto object = static_cast<std::uint32_t>(body);
-    const V3f origin = path.ray.origin * resolver_.world_to_rest(object);
-    V3f direction;
-    resolver_.world_to_rest(object).multDirMatrix(path.ray.direction, direction);
-    Sampler coin = path.sampler;
-    coin.set_dimension(kSheetDimensions + 32U * path.vertex);
+    FractureRay ray;
+    ray.origin = path.ray.origin * resolver_.world_to_rest(object);
+    resolver_.world_to_rest(object).multDirMatrix(path.ray.direction, ray.direction);
+    ray.radius = path.width, ray.spread = path.spread;
+    Sampler coins = path.sampler;
+    coins.set_dimension(kSheetDimensions + 32U * path.vertex);
     bool is_found = false;
     for (const Overlay& overlay : ice.overlays) {
         const float opacity = overlay.internal * age_weight(overlay, ice.age);
         if (overlay.pattern.kind != PatternKind::fracture || !(opacity > 0.0f)) continue;
-        float begin = 0.5f * overlay.pattern.width + 1e-4f;
-        for (int k = 0; k < kMaxSheets; ++k) {
-            float met = 0.0f, mask = 0.0f;
-            V3f met_normal;
-            const float footprint = path.width + path.spread * begin;
-            if (!next_fracture(overlay.pattern, origin, direction, begin, is_found ? t : reach, footprint, met, mask,
-                               met_normal)) {
-                break;
-            }
-            if (coin.next_1d() < mask * opacity) {
-                t = met, color = overlay.color, is_found = true;
-                resolver_.rest_to_world(object).multDirMatrix(met_normal, normal);
-                break;
-            }
-            begin = met + 1e-4f * overlay.pattern.size;
-        }
+        ray.t_min = 0.5f * overlay.pattern.width + 1e-4f;
+        ray.t_max = is_found ? t : reach;
+        V3f met_normal;
+        if (!find_fracture(overlay.pattern, opacity, ray, coins, t, met_normal)) continue;
+        color = overlay.color, is_found = true;
+        resolver_.rest_to_world(object).multDirMatrix(met_normal, normal);
     }
     return is_found;
 }

@@ -15,6 +15,7 @@
 #include "frazil/render/overlay_layers.h"
 #include "frazil/render/shading.h"
 #include "frazil/render/surface.h"
+#include "frazil/render/tile.h"
 
 namespace frazil {
 
@@ -65,9 +66,7 @@ struct IceCore {
     Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
     bool is_primary = false;                // seen by the camera itself
     bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there
-    // Light that enters right here, for the compensation that fills up; its light group.
-    Rgb entering = Rgb(0.0f);
-    std::uint32_t entering_group = 0;
+    std::uint32_t entering_place = GatherRequest::kNowhere;
 };
 
 // The state of a path between two vertices.

@@ -48,10 +48,16 @@ bool PointGathers::append(const V3f& position, const V3f& normal, CoreSums& rows
     if (normal == V3f(0.0f)) return false;
     const std::size_t count = columns().count();
     Rgb* row = nullptr;
-    const float sum = blend_.visit(position, normal, [&](std::uint32_t point, float weight) {
+    const auto add = [&](std::uint32_t point, float weight) {
         if (!row) row = rows.add_row();
         add_weighted(row, at_points_.row(point), count, weight);
-    });
+    };
+    // Rows of a run lie side by side.
+    const auto ask = [&](std::uint32_t point, std::uint32_t points) {
+        const auto* bytes = reinterpret_cast<const char*>(at_points_.row(point));
+        for (std::size_t at = 0; at < points * count * sizeof(Rgb); at += 64) __builtin_prefetch(bytes + at);
+    };
+    const float sum = blend_.visit(position, normal, add, ask);
     if (!row) return false;
     const float scale = 1.0f / sum;
     for (std::size_t k = 0; k < count; ++k) row[k] *= scale;

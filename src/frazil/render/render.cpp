@@ -313,7 +313,8 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     const PathTracer tracer(scene, ray_scene, lights, bodies, group_of_light, layout, options.max_bounces,
                             pixel_cone(scene.camera, options.width, options.height),
                             layout.has("motion") ? &motion : nullptr);
-    const Gathering gathering(scene, bodies, layout);
+    const EnteringLight entering_light(ray_scene, lights, bodies, group_of_light);
+    const Gathering gathering(scene, bodies, layout, &entering_light);
     for (const std::string& warning : tracer.warnings()) stats.warnings.push_back(warning);
     const FilterSampler filter(options.filter);
     V3f view_axis;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "frazil/base/vec.h"
@@ -37,6 +38,16 @@ struct PrimaryHit {
     V2f motion = V2f(0.0f);  // of the background where nothing is hit
 };
 
+// A place on the surface of ice where light may enter (entering_light.h).
+struct EnteringPlace {
+    std::uint32_t object = 0;
+    V3f position = V3f(0.0f), normal = V3f(0.0f), geometric_normal = V3f(0.0f);
+    float roughness = 0.0f;             // of the boundary
+    float bare = 1.0f;                  // what overlays let through
+    float u_pick = 0.0f, u_ask = 0.0f;  // choose a light, and whether it is asked at all
+    V2f u = V2f(0.0f);                  // chooses a direction
+};
+
 // Exitance wanted at a place on ice, and what becomes of it.
 struct GatherRequest {
     std::uint32_t object = 0;
@@ -52,6 +63,9 @@ struct GatherRequest {
     // Light that enters right here, for the compensation that fills up; its light group.
     Rgb entering = Rgb(0.0f);
     std::uint32_t entering_group = 0;
+    // Where that is: an index into Tile::entering_places; its light is asked for when it is known how much fills up.
+    static constexpr std::uint32_t kNowhere = ~std::uint32_t(0);
+    std::uint32_t entering_place = kNowhere;
     // Of light path expressions: number, state, radiance per exitance.
     struct Lpe {
         std::uint32_t lpe = 0, state = 0;
@@ -64,7 +78,7 @@ struct GatherRequest {
         std::size_t plane = 0;
         Rgb diffuse = Rgb(0.0f), core = Rgb(0.0f), seen_through = Rgb(0.0f);
     };
-    std::vector<Overlay> overlays;
+    std::uint32_t first_overlay = 0, overlay_count = 0;  // in Tile::overlays
 };
 
 // Where a sample's path first meets a surface, for the layers of its openness; `u` chooses a direction.
@@ -131,10 +145,12 @@ class Tile {
         count_id(objects_[seen_through ? hits_.size() + pixel : pixel], object, samples);
     }
 
-    void add_primary(std::size_t pixel, const PrimaryHit& hit) {
+    // Count a sample that shows something; whether that is nearer than all before.
+    bool add_hit(std::size_t pixel, float depth) {
         ++hits_[pixel];
-        if (hit.depth < nearest_[pixel].depth) nearest_[pixel] = hit;
+        return depth < nearest_[pixel].depth;
     }
+    void set_nearest(std::size_t pixel, const PrimaryHit& hit) { nearest_[pixel] = hit; }
 
     // What shading finds where a sample sees a surface, for as many samples as it stands for.
     void add_shaded(std::size_t pixel, const V3f& normal, const Rgb& albedo, float samples) {
@@ -188,6 +204,12 @@ class Tile {
     const PrimaryHit& nearest(std::size_t pixel) const { return nearest_[pixel]; }
 
     std::vector<GatherRequest> requests;
+    // Of all requests.
+    std::vector<GatherRequest::Overlay> overlays;
+    std::vector<EnteringPlace> entering_places;
+    std::span<const GatherRequest::Overlay> overlays_of(const GatherRequest& request) const {
+        return {overlays.data() + request.first_overlay, request.overlay_count};
+    }
     std::vector<SeenPlace> places;
     bool keeps_places = false;
     int subset = 0;  // of the sample that is traced or gathered now

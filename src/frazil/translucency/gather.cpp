@@ -4,7 +4,6 @@
 #include <span>
 
 #include "frazil/base/error.h"
-#include "frazil/base/large_pages.h"
 #include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/radix_sort.h"
@@ -208,8 +207,8 @@ Gathered PointTree::gather(const V3f* positions, std::size_t count, const Gather
     const TreeKernel& kernel = *tree.kernel;
     Gathered out;
     out.groups = tree.groups;
-    assign_on_large_pages(out.exitance, count * tree.groups, Rgb(0.0f));
-    assign_on_large_pages(out.coverage, count, Rgb(0.0f));
+    out.exitance.assign(count * tree.groups, Rgb(0.0f));
+    out.coverage.assign(count, Rgb(0.0f));
     if (options.ramp_layers && kernel.ramp.is_empty()) {
         throw ValueError("PointTree: ramp_layers must be off without a ramp, got on. Give the tree a ramp.");
     }

@@ -3,7 +3,6 @@
 #include <bit>
 
 #include "frazil/base/error.h"
-#include "frazil/base/large_pages.h"
 #include "frazil/base/morton.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/radix_sort.h"
@@ -234,7 +233,7 @@ PointClusters cluster_points(const PointSet& points, const Cells* cells, const s
     if (keys.empty()) return tree;
     const std::size_t n = keys.size();
     tree.order.resize(n);
-    assign_on_large_pages(tree.positions, n, V3f(0.0f));
+    tree.positions.assign(n, V3f(0.0f));
     tree.footprints.resize(n);
     tree.areas.resize(n);
     parallel_for(n, 4096, [&](std::size_t begin, std::size_t end) {
@@ -256,10 +255,10 @@ PointClusters cluster_points(const PointSet& points, const Cells* cells, const s
     {
         std::vector<TreeNode> grown;
         tree.level_begin = split_nodes(keys, grown, ranges);
-        assign_on_large_pages(tree.nodes, grown.size());
+        tree.nodes.assign(grown.size(), {});
         std::copy(grown.begin(), grown.end(), tree.nodes.begin());
     }
-    assign_on_large_pages(tree.areas_of_nodes, tree.nodes.size());
+    tree.areas_of_nodes.assign(tree.nodes.size(), {});
     for (std::size_t level = tree.level_begin.size() - 1; level-- > 0;) {
         const std::uint32_t first = tree.level_begin[level];
         parallel_for(tree.level_begin[level + 1] - first, 512, [&](std::size_t begin, std::size_t end) {

@@ -1,7 +1,6 @@
 #include "frazil/translucency/point_tree.h"
 
 #include "frazil/base/error.h"
-#include "frazil/base/large_pages.h"
 #include "frazil/base/parallel.h"
 #include "frazil/translucency/point_tree_data.h"
 
@@ -167,7 +166,7 @@ PointTree::PointTree(std::shared_ptr<const PointClusters> of_clusters, std::shar
 
     // Bring the light into the clusters' order.
     constexpr std::size_t grain = 4096;
-    assign_on_large_pages(tree.irradiance, n * groups, Rgb(0.0f));
+    tree.irradiance.assign(n * groups, Rgb(0.0f));
     if (!moments.empty()) tree.leans.resize(n * groups);
     std::vector<std::uint32_t> unlit((n + grain - 1) / grain, 0);
     parallel_for(n, grain, [&](std::size_t begin, std::size_t end) {
@@ -189,7 +188,7 @@ PointTree::PointTree(std::shared_ptr<const PointClusters> of_clusters, std::shar
     for (const std::uint32_t here : unlit) tree.dropped += here;
 
     // Sum it upwards.
-    assign_on_large_pages(tree.node_powers, clusters.nodes.size() * groups);
+    tree.node_powers.assign(clusters.nodes.size() * groups, {});
     for (std::size_t level = clusters.level_begin.size() - 1; level-- > 0;) {
         const std::uint32_t first = clusters.level_begin[level];
         parallel_for(clusters.level_begin[level + 1] - first, 512, [&](std::size_t begin, std::size_t end) {
