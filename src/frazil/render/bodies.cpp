@@ -25,12 +25,6 @@ std::shared_ptr<const std::array<DirectionalAlbedo, 3>> directional_albedos(cons
     return result;
 }
 
-// The cosine inside of a ray outside.
-float cosine_inside(float cos_theta, float eta) {
-    const float sine = std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)) / eta;
-    return std::sqrt(std::max(0.0f, 1.0f - sine * sine));
-}
-
 }  // namespace
 
 float Body::transmittance(float cos_theta, float roughness) const {
@@ -41,13 +35,18 @@ float Body::transmittance_average(float roughness) const {
     return 1.0f - material->specular * boundary->average(alpha_from_roughness(roughness));
 }
 
+float Body::cosine_inside(float cos_theta) const {
+    const float sine = std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)) / medium.eta;
+    return std::sqrt(std::max(0.0f, 1.0f - sine * sine));
+}
+
 Rgb Body::angular_share(float cos_theta) const {
-    const float mu = cosine_inside(cos_theta, medium.eta);
+    const float mu = cosine_inside(cos_theta);
     return {(*by_angle)[0](mu), (*by_angle)[1](mu), (*by_angle)[2](mu)};
 }
 
-Rgb Body::leaving_share(float cos_theta) const {
-    return angular_share(cos_theta) / (*white_by_angle)(cosine_inside(cos_theta, medium.eta));
+Rgb Body::leaving_share(float cosine) const {
+    return Rgb((*by_angle)[0](cosine), (*by_angle)[1](cosine), (*by_angle)[2](cosine)) / (*white_by_angle)(cosine);
 }
 
 V3f Body::drift(const V3f& direction, const V3f& normal) const {
@@ -72,8 +71,12 @@ float Body::depth() const {
     // The mean cosine inside of light from all around, in closed form; 2/3 where the boundary does not bend it.
     const float eta = medium.eta, bent = 1.0f - 1.0f / (eta * eta);
     const float cosine = 2.0f / 3.0f * eta * eta * (1.0f - bent * std::sqrt(bent));
-    const Rgb length = drift_length() * eta;
-    return cosine * (length.x + length.y + length.z) / 3.0f;
+    return cosine * first_scattering();
+}
+
+float Body::first_scattering() const {
+    const Rgb length = drift_length() * medium.eta;
+    return (length.x + length.y + length.z) / 3.0f;
 }
 
 Rgb Body::drift_length() const {
@@ -103,6 +106,7 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
         std::shared_ptr<const TreeKernel> kernel, plain_kernel;
         std::shared_ptr<const std::array<DirectionalAlbedo, 3>> by_angle;
         std::shared_ptr<const DirectionalAlbedo> white_by_angle;
+        std::shared_ptr<const ThinMedium> thin;
     };
     std::map<std::tuple<const IceMaterial*, bool, float>, Shared> shared;     // by mean density
     std::map<std::pair<const IceMaterial*, std::uint32_t>, float> densities;  // by mesh
@@ -128,18 +132,20 @@ std::vector<std::unique_ptr<Body>> make_bodies(const Scene& scene) {
             is_traced = found->second;
         }
         const double traced = is_traced ? material->volume : 0.0;
-        auto& [profile, kernel, plain_kernel, by_angle, white_by_angle] = shared[{material, is_traced, mean}];
+        auto& [profile, kernel, plain_kernel, by_angle, white_by_angle, thin] = shared[{material, is_traced, mean}];
         if (!profile) {
             profile = make_profile(material->profile, medium, 1.0 - traced);
             plain_kernel = make_tree_kernel(*profile);
             const double less_once = lacks_single_scattering(material->profile) ? traced : 0.0;
             by_angle = directional_albedos(medium, less_once);
             white_by_angle = std::make_shared<const DirectionalAlbedo>(1.0, medium.eta, less_once);
+            thin = std::make_shared<const ThinMedium>(ThinMedium::of(medium, static_cast<float>(less_once)));
             kernel = material->ramp.is_empty() ? plain_kernel : make_tree_kernel(*profile, material->ramp);
         }
         bodies[i] = std::make_unique<Body>(material, medium, boundary, *profile, kernel, plain_kernel);
         bodies[i]->by_angle = by_angle;
         bodies[i]->white_by_angle = white_by_angle;
+        bodies[i]->thin = thin;
         if (!is_traced || !lacks_single_scattering(material->profile)) continue;
         const double white = half_space_albedo(1.0, medium.eta).single;
         bodies[i]->traced = static_cast<float>(traced);
@@ -185,40 +191,38 @@ bool ThicknessTrees::is_closed_body(std::size_t leader) {
     return found->second;
 }
 
-std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
+std::shared_ptr<const Thinness> ThicknessTrees::thinness_of(std::size_t leader) {
     const PlacedPoints& points = sets_.points(leader);
-    if (points.size() == 0) return nullptr;
     const Body& body = *bodies_[leader];
     const float seen_through = is_closed_body(leader) ? body.material->refraction : 0.0f;
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
-    const auto gain = [&](PlacementMask mask) {
-        return thickness_gain(points.in_world(), ray_scene_, body.medium, body.traced, seen_through,
-                              sets_.shells(leader), mask);
+    const auto make = [&](PlacementMask mask) {
+        return thinness(points.in_world(), points.inward_in_world(), ray_scene_, *body.thin, seen_through,
+                        sets_.shells(leader), mask);
     };
-    if (!is_shared(leader)) return make_tree(points, body.plain_kernel, gain(nullptr), 1);
-    auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
-    if (shared) return shared;
+    if (!is_shared(leader)) return std::make_shared<const Thinness>(make(nullptr));
     const Rgb &scatter = body.medium.sigma_s_prime, &absorb = body.medium.sigma_a;
-    const auto known = points.cloud().thin_gain(
+    return points.cloud().thinness(
         {scatter.x, scatter.y, scatter.z, absorb.x, absorb.y, absorb.z, body.medium.eta, body.traced, seen_through},
-        [&] { return gain(&itself); });
-    return shared = make_tree(points, body.plain_kernel, *known, 1);
+        [&] { return make(&itself); });
 }
 
-std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::size_t leader,
-                                                                        const GatherOptions& options) {
+std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
     const PlacedPoints& points = sets_.points(leader);
-    const auto make = [&] {
-        const std::vector<V3f> positions = points.cloud().inward_positions();
-        return std::make_shared<const std::vector<Rgb>>(
-            thickness_gains(of(leader).get(), positions.data(), positions.size(), options));
-    };
-    if (points.size() == 0) return std::make_shared<const std::vector<Rgb>>();
-    if (!is_shared(leader)) return make();
-    auto& shared = gains_[{&points.cloud(), bodies_[leader]->plain_kernel.get()}];
-    if (!shared) shared = make();
+    if (points.size() == 0) return nullptr;
+    const Body& body = *bodies_[leader];
+    const auto plant = [&] { return make_tree(points, body.plain_kernel, thinness_of(leader)->exponent, 1); };
+    if (!is_shared(leader)) return plant();
+    auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
+    if (!shared) shared = plant();
     return shared;
+}
+
+std::shared_ptr<const std::vector<Rgb>> ThicknessTrees::gains_at_points(std::size_t leader) {
+    if (sets_.points(leader).size() == 0) return nullptr;
+    const std::shared_ptr<const Thinness> known = thinness_of(leader);
+    return {known, &known->gain};
 }
 
 Rgb Body::gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const {

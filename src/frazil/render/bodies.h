@@ -23,6 +23,7 @@
 #include "frazil/render/scene.h"
 #include "frazil/render/shells.h"
 #include "frazil/render/surface.h"
+#include "frazil/render/thickness.h"
 #include "frazil/translucency/half_space.h"
 #include "frazil/translucency/point_tree.h"
 
@@ -60,7 +61,9 @@ struct Body {
     std::shared_ptr<const PointGathers> at_points = nullptr;  // where a render has a use for them
     std::shared_ptr<const InnerGathers> inside = nullptr;     // beside at_points
 
-    // What exitance is scaled by where W is `coverage`; `thin` is one of thickness_gains(), null without.
+    std::shared_ptr<const ThinMedium> thin = nullptr;
+
+    // What exitance is scaled by where W is `coverage`; `thin` is what thin parts gain (thin_gain), null without.
     Rgb gain(const Compensation& compensation, const Rgb& coverage, const Rgb* thin) const;
 
     // What the boundary lets in (and out) at this angle; its mean over all directions; for one user roughness.
@@ -69,8 +72,11 @@ struct Body {
     // How light that enters or leaves depends on the angle (cosine outside): the directional albedo of a half space of the
     // core, over its mean.
     Rgb angular_share(float cos_theta) const;
-    // As it leaves to a camera, over what a white core would send there: rays find that themselves (cross_interior).
-    Rgb leaving_share(float cos_theta) const;
+    // As it leaves to a camera, over what a white core would send there: rays find that themselves (cross_interior). `cosine`
+    // inside, times how far in it comes from on the mean, in free paths.
+    Rgb leaving_share(float cosine) const;
+    // The cosine inside of a ray outside.
+    float cosine_inside(float cos_theta) const;
     // The tangential part of the way to where light that comes along `direction` is scattered first, on the mean, weighted by
     // what leaves again.
     V3f drift(const V3f& direction, const V3f& normal) const;
@@ -78,6 +84,8 @@ struct Body {
     Rgb drift_length() const;
     // What is left of the way where light that is not scattered leaves the body after `length` metres.
     float drift_within(float length) const;
+    // The mean length of that way inside, over channels.
+    float first_scattering() const;
     // How far inwards that is, on the mean over light from all around.
     float depth() const;
     float sigma_t() const;  // mean over channels
@@ -114,7 +122,7 @@ std::shared_ptr<const PointTree> make_tree(const PlacedPoints& points, std::shar
 
 class TranslucencySets;
 
-// Trees that sum the gain of thin parts (thickness.h) over the points of bodies. A closed body's chords end at its own other
+// Trees that sum the exponent of thin parts (thickness.h) over the points of bodies. A closed body's chords end at its own other
 // side, so that bodies that share their points share this too; an open one's at whatever is there.
 class ThicknessTrees {
   public:
@@ -125,12 +133,13 @@ class ThicknessTrees {
 
     // Of a leader of translucency sets; null where it has no points.
     std::shared_ptr<const PointTree> of(std::size_t leader);
-    // The mean gain around each of its points, from such a tree.
-    std::shared_ptr<const std::vector<Rgb>> gains_at_points(std::size_t leader, const GatherOptions& options);
+    // The gain of each of its points; null where it has none.
+    std::shared_ptr<const std::vector<Rgb>> gains_at_points(std::size_t leader);
 
   private:
     bool is_shared(std::size_t leader);
     bool is_closed_body(std::size_t leader);
+    std::shared_ptr<const Thinness> thinness_of(std::size_t leader);
 
     const Scene& scene_;
     const RayScene& ray_scene_;
@@ -140,7 +149,6 @@ class ThicknessTrees {
     // By what they depend on: points, and a kernel that a material has for itself.
     using Key = std::pair<const PointCloud*, const TreeKernel*>;
     std::map<Key, std::shared_ptr<const PointTree>> trees_;
-    std::map<Key, std::shared_ptr<const std::vector<Rgb>>> gains_;
 };
 
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is

@@ -206,7 +206,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     std::size_t points = 0;
     for (std::size_t i = 0; i < lit.size(); ++i) {
         points += lit[i].points.size();
-        if (bodies[i] && sets.is_leader(i)) gains[i] = thickness.gains_at_points(i, options.gather);
+        if (bodies[i] && sets.is_leader(i)) gains[i] = thickness.gains_at_points(i);
     }
     if (points == 0) return;
 

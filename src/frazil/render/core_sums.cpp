@@ -48,24 +48,24 @@ CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below, cons
     fill_tree(0, light);
     if (columns.has_surface) fill_tree(columns.of_tree(), trees.on_surface->gather(on_surface.data(), count, options));
     if (columns.has_thin) {
-        fill(columns.thin(), thickness_gains(trees.thickness.get(), below.data(), count, options).data(), 1);
+        fill(columns.thin(), thin_exponents(trees.thickness.get(), below.data(), count, options).data(), 1);
     }
     fill(columns.first_overlay(), overlays.exitance.data(), columns.overlays);
     return sums;
 }
 
-std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+std::vector<Rgb> thin_exponents(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options) {
     if (!thickness) return {};
     const Gathered sums =
         thickness->gather(positions, count, {kThicknessTolerance * options.tolerance, Estimator::sum, false});
-    std::vector<Rgb> gains(count, Rgb(1.0f));
+    std::vector<Rgb> exponents(count, Rgb(0.0f));
     for (std::size_t i = 0; i < count; ++i) {
         for (int c = 0; c < 3; ++c) {
-            if (sums.coverage[i][c] > 0.0f) gains[i][c] = std::max(1.0f, sums.exitance[i][c] / sums.coverage[i][c]);
+            if (sums.coverage[i][c] > 0.0f) exponents[i][c] = sums.exitance[i][c] / sums.coverage[i][c];
         }
     }
-    return gains;
+    return exponents;
 }
 
 }  // namespace frazil

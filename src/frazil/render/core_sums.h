@@ -63,7 +63,7 @@ class CoreSums {
     TreeSums on_surface(std::size_t i) const {
         return {columns_.has_surface ? row(i) + columns_.of_tree() : row(i), columns_.groups, columns_.knots};
     }
-    // thickness_gains(); null without.
+    // thin_exponents(); null without.
     const Rgb* thin(std::size_t i) const { return columns_.has_thin ? row(i) + columns_.thin() : nullptr; }
     // (layers, groups); null without.
     const Rgb* overlays(std::size_t i) const {
@@ -87,8 +87,8 @@ class CoreSums {
 CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below, const std::vector<V3f>& on_surface,
                      const GatherOptions& options);
 
-// The mean gain around each position, from such a tree; empty without one.
-std::vector<Rgb> thickness_gains(const PointTree* thickness, const V3f* positions, std::size_t count,
+// The mean exponent of thin parts around each position, from such a tree; empty without one.
+std::vector<Rgb> thin_exponents(const PointTree* thickness, const V3f* positions, std::size_t count,
                                  const GatherOptions& options);
 
 // Add the first `count` columns of a row, weighted, to those of another.

@@ -67,13 +67,18 @@ struct Scales {
 // on the surface.
 class Exitance {
   public:
-    Exitance(const Body& body, const CoreSums& sums, std::size_t row)
+    // `plane` is what of even light a half space sends where it is seen.
+    Exitance(const Body& body, const CoreSums& sums, std::size_t row, const Rgb& plane)
         : body_(body),
           below_(sums.below(row)),
           on_surface_(sums.on_surface(row)),
           has_surface_(sums.columns().has_surface),
-          thin_(sums.thin(row)),
-          overlays_(sums.overlays(row)) {}
+          overlays_(sums.overlays(row)) {
+        if (const Rgb* exponent = sums.thin(row)) {
+            thin_ = thin_gain(*exponent, plane);
+            has_thin_ = true;
+        }
+    }
 
     std::size_t groups() const { return below_.groups; }
     std::size_t knots() const { return std::max<std::size_t>(below_.knots, 1); }
@@ -113,13 +118,15 @@ class Exitance {
   private:
     Rgb gain(const Compensation& compensation, const TreeSums& sums) const {
         return body_.gain(compensation, sums.coverage(),
-                          compensation.mode == CompensationMode::depth ? thin_ : nullptr);
+                          compensation.mode == CompensationMode::depth && has_thin_ ? &thin_ : nullptr);
     }
 
     const Body& body_;
     TreeSums below_, on_surface_;  // the latter is the former where there is none
     bool has_surface_;
-    const Rgb *thin_, *overlays_;
+    bool has_thin_ = false;
+    Rgb thin_ = Rgb(1.0f);
+    const Rgb* overlays_;
 };
 
 }  // namespace
@@ -214,7 +221,7 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = *requests[i];
-            const Exitance exitance(body, answers.sums, answers.row_of[i - begin]);
+            const Exitance exitance(body, answers.sums, answers.row_of[i - begin], request.plane);
             const Scales scales = exitance.scales(body.material->compensation);
             tile.subset = request.subset;
             const Rgb& coverage = exitance.coverage();

@@ -202,9 +202,11 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
             core.is_primary = path.bounce == 0;
             note_entering(core, path, surface, *body, tile);
             if (!is_open || crossing.to == InsideOf::kNone) {
-                const float chord = core.is_primary ? chord_behind(surface, path.ray.direction, tile) : 0.0f;
-                core.drift *= body->drift_within(chord);
-                if (core.is_primary) core.depth *= body->drift_within(0.5f * chord);
+                if (core.is_primary) {
+                    core.stop_within(body->drift_within(chord_behind(surface, path.ray.direction, tile)));
+                } else {
+                    core.drift = V3f(0.0f);
+                }
                 request_gather(path, core, Rgb(leaving), tile);
             } else if (split) {
                 *split = path;

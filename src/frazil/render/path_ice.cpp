@@ -39,7 +39,8 @@ IceCore PathTracer::core_at(const Path& path, const Surface& surface, int body, 
     core.depth = ice.depth();
     core.radiance_per_exitance = ice.inner_radiance_per_exitance(surface);
     if (!from_inside) {
-        core.radiance_per_exitance *= ice.leaving_share(std::abs(surface.normal.dot(path.ray.direction)));
+        core.slant = ice.cosine_inside(std::abs(surface.normal.dot(path.ray.direction)));
+        core.depth = core.slant * ice.first_scattering();
         core.drift = ice.drift(path.ray.direction, surface.normal);
     }
     return core;
@@ -100,11 +101,11 @@ bool PathTracer::cross_interior(Path& path, float length, Sampler& sampler, Tile
                             tile);
         }
     }
-    path.core.drift *= bodies_[std::size_t(body)]->drift_within(length);
-    path.core.depth *= bodies_[std::size_t(body)]->drift_within(0.5f * length);
-    request_gather(path, path.core, Rgb(1.0f) - (unscattered + once) * path.core_share, tile);
+    const Rgb seen_through = unscattered * exp(medium.sigma_a * -through.absorption);
+    path.core.stop_within(bodies_[std::size_t(body)]->drift_within(length));
+    request_gather(path, path.core, Rgb(1.0f) - (seen_through + once) * path.core_share, tile);
 
-    path.scale(unscattered * exp(medium.sigma_a * -through.absorption) * path.tint);
+    path.scale(seen_through * path.tint);
     path.clear = path.core_share = 1.0f;
     path.tint = Rgb(1.0f);
     const float left = path.worth();
@@ -196,8 +197,11 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     request.is_primary = core.is_primary;
     request.samples = path.samples;
     request.entering_place = core.entering_place;
+    const Rgb leaving = core.slant < 0.0f ? Rgb(1.0f) : body.leaving_share(core.slant * core.within);
+    const Rgb scale = core.radiance_per_exitance * leaving * share * body.core_scale;
+    request.plane = body.thin->plane * leaving;
     Scattering weights = path.weights();
-    weights.scale(core.radiance_per_exitance * share * body.core_scale);
+    weights.scale(scale);
     request.diffuse = weights.diffuse;
     request.specular = weights.specular;
     (core.is_primary ? request.translucency : request.refraction) = weights.refraction;
@@ -206,7 +210,7 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
         const auto seen_from = core.is_entered ? track.previous : track.state;
         const auto state = layout_.lpes[track.lpe].next(seen_from, LpeKind::translucency, request.object);
         if (state == LpeAutomaton::kDead) continue;
-        request.lpes.push_back({track.lpe, state, track.sum() * core.radiance_per_exitance * share * body.core_scale});
+        request.lpes.push_back({track.lpe, state, track.sum() * scale});
     }
     request.first_overlay = static_cast<std::uint32_t>(tile.overlays.size());
     for (const OverlayShare& overlay : path.overlays) {

@@ -63,10 +63,19 @@ struct IceCore {
     // From there along the surface to where the light that is seen was scattered last, on the mean, in a body without another side.
     V3f drift = V3f(0.0f);
     float depth = 0.0f;                     // how far inwards that is
-    Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index
+    float slant = -1.0f;                    // the cosine inside that it is seen at, < 0 where it is seen from inside
+    float within = 1.0f;                    // what of the way to where light is scattered first the body has room for
+    Rgb radiance_per_exitance = Rgb(0.0f);  // over squared index, averaged over angles
     bool is_primary = false;                // seen by the camera itself
     bool is_entered = false;                // its light leaves where the path went in: instead of the refraction there
     std::uint32_t entering_place = GatherRequest::kNowhere;
+
+    // Where the body ends before light is scattered first: how far it goes there, of how far it would go.
+    void stop_within(float part) {
+        within = part;
+        drift *= part;
+        depth *= part;
+    }
 };
 
 // The state of a path between two vertices.

@@ -63,17 +63,21 @@ void PointCloud::add_room(float sigma_t, float depth, const std::function<Room()
     clusters_ = nullptr;
 }
 
-std::shared_ptr<const std::vector<Rgb>> PointCloud::thin_gain(const ThinBody& of,
-                                                              const std::function<std::vector<Rgb>()>& make) {
+std::shared_ptr<const Thinness> PointCloud::thinness(const ThinBody& of, const std::function<Thinness()>& make) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (thinness_ && thin_body_ == of) return thinness_;
+    }
+    auto made = std::make_shared<const Thinness>(make());  // which asks for inward positions itself
     const std::lock_guard lock(mutex_);
-    if (!thin_gain_ || thin_body_ != of) thin_gain_ = std::make_shared<const std::vector<Rgb>>(make());
+    thinness_ = std::move(made);
     thin_body_ = of;
-    return thin_gain_;
+    return thinness_;
 }
 
-void PointCloud::drop_thin_gain() {
+void PointCloud::drop_thinness() {
     const std::lock_guard lock(mutex_);
-    thin_gain_ = nullptr;
+    thinness_ = nullptr;
 }
 
 std::vector<V3f> PointCloud::inward_positions() const {
@@ -112,6 +116,13 @@ PointSet PlacedPoints::in_world() const {
     PointSet result = cloud_->points();
     for (V3f& position : result.positions) position = position * to_world_;
     for (V3f& normal : result.normals) normal = transform_normal(normal, to_cloud_);
+    return result;
+}
+
+std::vector<V3f> PlacedPoints::inward_in_world() const {
+    if (!cloud_) return {};
+    std::vector<V3f> result = cloud_->inward_positions();
+    for (V3f& position : result) position = position * to_world_;
     return result;
 }
 

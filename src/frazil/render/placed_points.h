@@ -15,6 +15,7 @@
 #include "frazil/points/point_lookup.h"
 #include "frazil/points/point_set.h"
 #include "frazil/render/drift.h"
+#include "frazil/render/thickness.h"
 #include "frazil/translucency/point_clusters.h"
 
 namespace frazil {
@@ -42,10 +43,9 @@ class PointCloud {
 
     // What thin parts around its points return (thickness.h), for one body: made anew where the body it is `of` is another.
     using ThinBody = std::array<float, 9>;
-    std::shared_ptr<const std::vector<Rgb>> thin_gain(const ThinBody& of,
-                                                      const std::function<std::vector<Rgb>()>& make);
+    std::shared_ptr<const Thinness> thinness(const ThinBody& of, const std::function<Thinness()>& make);
     // Of use from the bake until trees are planted, while bodies stay where they are.
-    void drop_thin_gain();
+    void drop_thinness();
 
     // Made when first asked for, with the cells and the room that are there by then.
     std::shared_ptr<const PointClusters> clusters();
@@ -60,7 +60,7 @@ class PointCloud {
     Room room_;
     float sigma_t_ = 0.0f, depth_ = 0.0f;  // of the room
     ThinBody thin_body_{};
-    std::shared_ptr<const std::vector<Rgb>> thin_gain_;
+    std::shared_ptr<const Thinness> thinness_;
     std::shared_ptr<const PointClusters> clusters_, surface_clusters_;
     std::shared_ptr<const PointLookup> lookup_;
 };
@@ -79,6 +79,8 @@ class PlacedPoints {
     double spacing() const { return cloud_ ? cloud_->points().spacing : 0.0; }
 
     PointSet in_world() const;
+    // PointCloud::inward_positions() in the world.
+    std::vector<V3f> inward_in_world() const;
     // Moved into the world; places stay as they are.
     Cells cells_in_world() const;
     // Vectors of the world, such as moments of light, in the frame of the cloud.

@@ -361,9 +361,9 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
     return {canvas.finish(), std::move(stats)};
 }
 
-void drop_thin_gains(const Bake& bake) {
+void drop_thinness(const Bake& bake) {
     for (const LitPoints& lit : bake.bodies) {
-        if (lit.points.size() > 0) lit.points.cloud().drop_thin_gain();
+        if (lit.points.size() > 0) lit.points.cloud().drop_thinness();
     }
 }
 
@@ -374,7 +374,7 @@ BakeResult bake_in_arena(const Scene& scene, const RenderOptions& options, Bake 
     const std::vector<std::unique_ptr<Body>> bodies = make_bodies(scene);
     Bake result = make_bake(scene, ray_scene, bodies, options, std::move(known), stats, progress);
     for (const LitPoints& lit : result.bodies) stats.points += lit.points.size();
-    drop_thin_gains(result);
+    drop_thinness(result);
     return {std::move(result), std::move(stats)};
 }
 

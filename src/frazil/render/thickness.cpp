@@ -6,7 +6,9 @@
 #include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
 #include "frazil/base/trigonometry.h"
+#include "frazil/base/sampler.h"
 #include "frazil/render/chords.h"
+#include "frazil/render/drift.h"
 #include "frazil/translucency/fresnel.h"
 #include "frazil/translucency/half_space.h"
 
@@ -67,66 +69,121 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
     return places;
 }
 
-// What is absorbed of light that could go `way` metres, of which a half space absorbs `most`.
-float absorbed_part(float sigma_a, float way, float most) {
-    const float t = std::tanh(sigma_a * way * (2.0f - most) / (2.0f * most));
-    return 2.0f * most * t / (2.0f - most + most * t);
+// Rays all around from the places below some points.
+constexpr int kAround = 32;
+
+std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which,
+                               const ScrambledNet& net, const ChordFinder& finder) {
+    std::vector<Ray> rays;
+    std::vector<V2f> u(net.size());
+    for (const std::uint32_t point : which) {
+        net.draw(kSeed + 3, point, u);
+        for (const V2f& sample : u) rays.push_back({places[point], uniform_sphere(sample)});
+    }
+    return finder.ways_out(rays);
 }
 
 }  // namespace
 
-std::vector<Rgb> thickness_gain(const PointSet& points, const RayScene& scene, const Medium& medium, float traced,
-                                float seen_through, const Shells* shells, PlacementMask mask) {
-    const auto albedo_of = [&](double alpha) { return half_space_albedo(alpha, medium.eta); };
-    Rgb returned(1.0f), once(0.0f);  // A, and what of it is traced
-    for (int c = 0; c < 3; ++c) {
+ThinMedium ThinMedium::of(const Medium& medium, float traced) {
+    const auto alpha = [&](int c) {
         const double scatter = medium.sigma_s_prime[c];
-        const HalfSpaceAlbedo plane = albedo_of(scatter / (scatter + medium.sigma_a[c]));
-        returned[c] = static_cast<float>(plane.all());
-        once[c] = traced * static_cast<float>(plane.single);
+        return scatter / (scatter + medium.sigma_a[c]);
+    };
+    ThinMedium thin{medium,
+                    {EvenLight(alpha(0), medium.eta), EvenLight(alpha(1), medium.eta), EvenLight(alpha(2), medium.eta)},
+                    traced};
+    const double white = half_space_albedo(1.0, medium.eta).single;
+    for (int c = 0; c < 3; ++c) {
+        const HalfSpaceAlbedo albedo = half_space_albedo(alpha(c), medium.eta);
+        thin.plane[c] = static_cast<float>((albedo.all() - traced * albedo.single) / (1.0 - traced * white));
     }
-    const float white_once = traced > 0.0f ? traced * static_cast<float>(albedo_of(1.0).single) : 0.0f;
+    return thin;
+}
+
+Rgb thin_gain(const Rgb& exponent, const Rgb& plane) {
+    Rgb gain(1.0f);
+    for (int c = 0; c < 3; ++c) {
+        if (exponent[c] > 0.0f && plane[c] > 0.0f && plane[c] < 1.0f) {
+            gain[c] = (1.0f - std::exp(-exponent[c]) * (1.0f - plane[c])) / plane[c];
+        }
+    }
+    return gain;
+}
+
+Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayScene& scene, const ThinMedium& thin,
+                  float seen_through, const Shells* shells, PlacementMask mask) {
+    const Medium& medium = thin.medium;
+    Rgb once(0.0f);  // light of one scattering that a half space returns and rays trace
+    float white_once = 0.0f;
+    if (thin.traced > 0.0f) {
+        white_once = thin.traced * static_cast<float>(half_space_albedo(1.0, medium.eta).single);
+        for (int c = 0; c < 3; ++c) {
+            const double scatter = medium.sigma_s_prime[c];
+            once[c] = thin.traced *
+                      static_cast<float>(half_space_albedo(scatter / (scatter + medium.sigma_a[c]), medium.eta).single);
+        }
+    }
     // Of light that is scattered once in an index-matched half space, from all around [Chandrasekhar1960].
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
-    const float stretch = medium.eta * medium.eta / (1.0f - fresnel_average(medium.eta));
-    std::vector<Rgb> gain(points.size(), Rgb(1.0f));
+    Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
     const ChordFinder finder(scene, shells, mask);
+    const ScrambledNet net(kAround);
+    std::vector<V3f> on_surface;
+    if (below.empty()) {
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            on_surface.push_back(offset_origin(points.positions[k], -points.normals[k]));
+        }
+        below = on_surface;
+    }
     const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
         const std::vector<Chord> all_chords = finder.find(points, which, kSeed);
+        const std::vector<float> all_ways = ways_around(below, which, net, finder);
         const std::vector<OnceScattered> all_places =
-            traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
-                          : std::vector<OnceScattered>(all_chords.size());
+            thin.traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
+                               : std::vector<OnceScattered>(all_chords.size());
         for (std::size_t at = 0; at < which.size(); ++at) {
             const std::span chords = std::span(all_chords).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
             const std::span places = std::span(all_places).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
+            const std::span ways = std::span(all_ways).subspan(at * kAround, kAround);
             const std::size_t k = which[at];
             if (!finder.is_closed(chords)) continue;
+            const float depth = (below[k] - points.positions[k]).dot(-points.normals[k]);
             for (int c = 0; c < 3; ++c) {
-                const float most = 1.0f - returned[c], plane = returned[c] - once[c];
-                if (!(most > 0.0f && plane > 0.0f)) continue;
-                const float scatter = medium.sigma_s_prime[c], absorb = medium.sigma_a[c], all_of = scatter + absorb;
+                const float scatter = medium.sigma_s_prime[c], all_of = scatter + medium.sigma_a[c];
+                if (!(medium.sigma_a[c] > 0.0f && scatter > 0.0f)) continue;
+                const EvenLight& light = thin.even_light[std::size_t(c)];
+                float sum = 0.0f;
+                for (const float way : ways) sum += light.along(way * all_of);
+                const float more = std::max(0.0f, sum / float(kAround) - light.half_space(depth * all_of));
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
-                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f;
+                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f;
                 for (std::size_t i = 0; i < chords.size(); ++i) {
-                    const float length = chords[i].length, way = places[i].way;
+                    const float length = chords[i].length * all_of, way = places[i].way;
+                    const float straight = std::exp(-length), filled = 1.0f - seen_through * straight;
                     const float scattered = scatter * places[i].metres / matched_once;
-                    absorbed += absorbed_part(absorb, stretch * length, most);
-                    traced_out += seen_through * std::exp(-all_of * length) +
-                                  once[c] * all_of / scatter * scattered * std::exp(-all_of * way);
-                    clear +=
-                        seen_through * std::exp(-scatter * length) + white_once * scattered * std::exp(-scatter * way);
+                    const float sent = light.returned(chords[i].cosine * first_scattering_within(length));
+                    absorbed += (1.0f - straight) * std::exp(-more) * (1.0f - sent);
+                    plane += filled * sent;
+                    traced_out += 1.0f - filled + once[c] * all_of / scatter * scattered * std::exp(-all_of * way);
+                    clear += 1.0f - filled + white_once * scattered * std::exp(-scatter * way);
                 }
                 const float all = static_cast<float>(chords.size());
                 if (!(all - clear > kThinnest * all)) continue;
-                const float core = (all - absorbed - traced_out) / (all - clear) * (1.0f - white_once);
-                gain[k][c] = std::max(core, 0.0f) / plane;
+                const float core = std::clamp((all - absorbed - traced_out) / (all - clear), 0.0f, 1.0f);
+                result.gain[k][c] = core / thin.plane[c];
+                // Against a half space whose chords are as short; all of its light, as far as rays trace none.
+                const float as_short = thin.traced > 0.0f ? thin.plane[c] : plane / (all - clear);
+                if (core < 1.0f && as_short < 1.0f) {
+                    result.exponent[k][c] = std::max(0.0f, std::log((1.0f - as_short) / (1.0f - core)));
+                }
             }
         }
     });
-    return gain;
+    return result;
 }
 
 }  // namespace frazil

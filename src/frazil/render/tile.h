@@ -57,6 +57,7 @@ struct GatherRequest {
     float samples = 1.0f;                          // of the camera that the request stands for
     V3f position = V3f(0.0f), normal = V3f(0.0f);  // as in IceCore
     float depth = 0.0f;                            // as in IceCore
+    Rgb plane = Rgb(1.0f);                         // what of even light a half space's core sends there
     // Radiance per exitance, by the layer that it goes to: the primary ice's is translucency, further light goes the way of
     // its first lobe.
     Rgb translucency = Rgb(0.0f), diffuse = Rgb(0.0f), specular = Rgb(0.0f), refraction = Rgb(0.0f);

@@ -106,7 +106,67 @@ SkyLight sky_light(double alpha, double eta) {
     return sky;
 }
 
+constexpr double kShallowest = 1e-3;
+constexpr std::size_t kDepths = 96;
+
+// E2 from the nodes of cosines.
+double exponential_integral_2(const Nodes& nodes, double depth) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < nodes.mu.size(); ++i) sum += nodes.weight[i] * std::exp(-depth / nodes.mu[i]);
+    return sum;
+}
+
+// Solve a x = b by elimination; rows of `a` are dominated by their diagonals.
+std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
+    const std::size_t n = b.size();
+    for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t i = k + 1; i < n; ++i) {
+            const double factor = a[i * n + k] / a[k * n + k];
+            for (std::size_t j = k; j < n; ++j) a[i * n + j] -= factor * a[k * n + j];
+            b[i] -= factor * b[k];
+        }
+    }
+    for (std::size_t k = n; k-- > 0;) {
+        for (std::size_t j = k + 1; j < n; ++j) b[k] -= a[k * n + j] * b[j];
+        b[k] /= a[k * n + k];
+    }
+    return b;
+}
+
 }  // namespace
+
+// Milne's equation for B = 1 - J, constant over cells about the depths: with nothing absorbed all light comes back, so that
+// B(t) = 1 - alpha + alpha/2 (∫ (1 - I) e^{-t/mu} dmu + ∫ B(s) E1(|t - s|) ds). B is 1 below the last cell.
+HalfSpaceDepths half_space_absorbed(double alpha, double eta) {
+    const SkyLight sky = sky_light(alpha, eta);
+    // Diffusion's decay, in closed form; light of single scattering reaches further where albedos are low.
+    const double decay = std::sqrt(3.0 * (1.0 - alpha)), deepest = 25.0 / std::min(decay, 1.0);
+    const double step = std::log(deepest / kShallowest) / double(kDepths - 1);
+    HalfSpaceDepths result;
+    std::vector<double> edges{0.0};
+    for (std::size_t i = 0; i < kDepths; ++i) {
+        result.depths.push_back(kShallowest * std::exp(step * double(i)));
+        edges.push_back(result.depths.back() * std::exp(0.5 * step));
+    }
+    const auto e2 = [&](double depth) { return exponential_integral_2(sky.nodes, depth); };
+    std::vector<double> matrix(kDepths * kDepths), right(kDepths);
+    for (std::size_t i = 0; i < kDepths; ++i) {
+        const double depth = result.depths[i];
+        std::vector<double> to_edge;
+        for (const double edge : edges) to_edge.push_back(e2(std::abs(edge - depth)));
+        double unlit = 0.0;
+        for (std::size_t j = 0; j < sky.inward.size(); ++j) {
+            unlit += sky.nodes.weight[j] * (1.0 - sky.inward[j]) * std::exp(-depth / sky.nodes.mu[j]);
+        }
+        right[i] = 1.0 - alpha + 0.5 * alpha * (unlit + to_edge[kDepths]);
+        for (std::size_t j = 0; j < kDepths; ++j) {
+            const double share = j == i ? 2.0 - to_edge[j] - to_edge[j + 1] : std::abs(to_edge[j] - to_edge[j + 1]);
+            matrix[i * kDepths + j] = (i == j ? 1.0 : 0.0) - 0.5 * alpha * share;
+        }
+    }
+    result.absorbed = solve(std::move(matrix), std::move(right));
+    return result;
+}
 
 HalfSpaceAlbedo half_space_albedo(double alpha, double eta) {
     if (alpha == 0.0) return {0.0, 0.0};

@@ -1,0 +1,39 @@
+// Light inside a body that stands in even light of radiance 1 from all around: what its medium scatters at a place.
+// Model: J = 1 - exp(-<y>), <y> the mean of y(l) over all directions in which the body ends l optical depths away. In a half
+//   space J(tau) is known: Milne's equation J = alpha/2 (∫ I(mu) e^{-tau/mu} dmu + ∫ J(t) E1(|tau - t|) dt), I what goes in
+//   through the boundary, inner reflection included [Chandrasekhar1960]. There <y> = Y(tau) = -ln(1 - J(tau)), from which
+//   y(l) = 2 (Y(l) - l Y'(l)) follows, as <y> = 1/2 ∫_1^∞ y(tau s)/s² ds. What is absorbed, 1 - J, is so a product over
+//   directions: sqrt(1 - alpha) at the surface of an index-matched half space, its square 1 - alpha in a body so thin that
+//   light is scattered once at most, as it must be.
+// Units: optical depths, that is lengths times sigma_s' + sigma_a.
+// Valid: index-matched slabs, spheres and edges within 0.04 of J, albedo 0.3 to 0.99 (tests/cpp/test_even_light.cpp).
+// Not: light that is not even.
+#pragma once
+
+#include <vector>
+
+#include "frazil/translucency/half_space.h"
+
+namespace frazil {
+
+class EvenLight {
+  public:
+    EvenLight(double alpha, double eta);
+
+    // Y: -ln(1 - J) at a depth in a half space. Zero where nothing is absorbed: J is 1 everywhere.
+    float half_space(float depth) const;
+    // y: what a direction in which the body ends after so long a way adds to the mean over directions.
+    float along(float length) const;
+    // Radiance that a half space sends towards mu, the cosine inside; ∫ J(t mu) e^{-t} dt.
+    float returned(float mu) const { return albedo_ * by_angle_(mu); }
+
+  private:
+    float look_up(const std::vector<float>& table, float depth) const;
+
+    float albedo_ = 1.0f;
+    DirectionalAlbedo by_angle_;
+    float first_ = 0.0f, steps_ = 0.0f;         // ln of the first depth of the tables, steps per unit of ln
+    std::vector<float> half_space_, along_;
+};
+
+}  // namespace frazil
