@@ -104,8 +104,8 @@ ThinMedium ThinMedium::of(const Medium& medium, float traced) {
 Rgb thin_gain(const Rgb& exponent, const Rgb& plane) {
     Rgb gain(1.0f);
     for (int c = 0; c < 3; ++c) {
-        if (exponent[c] > 0.0f && plane[c] > 0.0f && plane[c] < 1.0f) {
-            gain[c] = (1.0f - std::exp(-exponent[c]) * (1.0f - plane[c])) / plane[c];
+        if (plane[c] > 0.0f && plane[c] < 1.0f) {
+            gain[c] = std::max(0.0f, 1.0f - std::exp(-exponent[c]) * (1.0f - plane[c])) / plane[c];
         }
     }
     return gain;
@@ -157,7 +157,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 const EvenLight& light = thin.even_light[std::size_t(c)];
                 float sum = 0.0f;
                 for (const float way : ways) sum += light.along(way * all_of);
-                const float more = std::max(0.0f, sum / float(kAround) - light.half_space(depth * all_of));
+                const float more = sum / float(kAround) - light.half_space(depth * all_of);
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
                 float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f;
@@ -177,9 +177,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 result.gain[k][c] = core / thin.plane[c];
                 // Against a half space whose chords are as short; all of its light, as far as rays trace none.
                 const float as_short = thin.traced > 0.0f ? thin.plane[c] : plane / (all - clear);
-                if (core < 1.0f && as_short < 1.0f) {
-                    result.exponent[k][c] = std::max(0.0f, std::log((1.0f - as_short) / (1.0f - core)));
-                }
+                if (core < 1.0f && as_short < 1.0f) result.exponent[k][c] = std::log((1.0f - as_short) / (1.0f - core));
             }
         }
     });

@@ -36,7 +36,7 @@ struct ThinMedium {
 // Per point.
 struct Thinness {
     std::vector<Rgb> gain;      // what the core returns over what a half space's does, both less what is traced
-    std::vector<Rgb> exponent;  // Z, >= 0
+    std::vector<Rgb> exponent;  // Z; below zero where the surface is hollow
 };
 
 // `below` are the places where light is scattered first, one per point, on the mean; the points themselves where it is empty.
