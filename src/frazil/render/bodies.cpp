@@ -50,8 +50,7 @@ Rgb Body::leaving_share(float cosine) const {
 }
 
 V3f Body::drift(const V3f& direction, const V3f& normal) const {
-    const Rgb length = drift_length();
-    return (direction - normal * direction.dot(normal)) * ((length.x + length.y + length.z) / 3.0f);
+    return (direction - normal * direction.dot(normal)) / (medium.eta * sigma_t());
 }
 
 float Body::sigma_t() const {
@@ -71,12 +70,7 @@ float Body::depth() const {
     // The mean cosine inside of light from all around, in closed form; 2/3 where the boundary does not bend it.
     const float eta = medium.eta, bent = 1.0f - 1.0f / (eta * eta);
     const float cosine = 2.0f / 3.0f * eta * eta * (1.0f - bent * std::sqrt(bent));
-    return cosine * first_scattering();
-}
-
-float Body::first_scattering() const {
-    const Rgb length = drift_length() * medium.eta;
-    return (length.x + length.y + length.z) / 3.0f;
+    return cosine / sigma_t();
 }
 
 Rgb Body::drift_length() const {

@@ -77,16 +77,13 @@ struct Body {
     Rgb leaving_share(float cosine) const;
     // The cosine inside of a ray outside.
     float cosine_inside(float cos_theta) const;
-    // The tangential part of the way to where light that comes along `direction` is scattered first, on the mean, weighted by
-    // what leaves again.
+    // The tangential part of a free path inside along a `direction` outside.
     V3f drift(const V3f& direction, const V3f& normal) const;
-    // The length of that way per channel, where light comes along the surface.
+    // The mean way to where light that comes along the surface is scattered first, per channel, weighted by what leaves again.
     Rgb drift_length() const;
-    // What is left of the way where light that is not scattered leaves the body after `length` metres.
+    // What is left of such a way where light that is not scattered leaves the body after `length` metres.
     float drift_within(float length) const;
-    // The mean length of that way inside, over channels.
-    float first_scattering() const;
-    // How far inwards that is, on the mean over light from all around.
+    // How far inwards a free path goes, on the mean over light from all around.
     float depth() const;
     float sigma_t() const;  // mean over channels
     // Of the channel that scatters and absorbs most.

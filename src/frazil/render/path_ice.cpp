@@ -40,7 +40,7 @@ IceCore PathTracer::core_at(const Path& path, const Surface& surface, int body, 
     core.radiance_per_exitance = ice.inner_radiance_per_exitance(surface);
     if (!from_inside) {
         core.slant = ice.cosine_inside(std::abs(surface.normal.dot(path.ray.direction)));
-        core.depth = core.slant * ice.first_scattering();
+        core.depth = core.slant / ice.sigma_t();
         core.drift = ice.drift(path.ray.direction, surface.normal);
     }
     return core;
