@@ -186,17 +186,18 @@ TEST_CASE("placed points: what thin parts return is made once for a body, and fo
     PointCloud cloud(poisson_points(sphere(0.3f, 2), 0.1));
     int made = 0;
     const auto gain_of = [&](float absorption) {
-        return cloud.thin_gain({1.0f, 1.0f, 1.0f, absorption}, [&] {
+        const auto known = cloud.thinness({1.0f, 1.0f, 1.0f, absorption}, [&] {
             ++made;
-            return std::vector<Rgb>(cloud.points().size(), Rgb(absorption));
+            return Thinness{std::vector<Rgb>(cloud.points().size(), Rgb(absorption)), {}};
         });
+        return known->gain.front();
     };
-    CHECK(gain_of(0.1f)->front() == Rgb(0.1f));
-    CHECK(gain_of(0.1f)->front() == Rgb(0.1f));
+    CHECK(gain_of(0.1f) == Rgb(0.1f));
+    CHECK(gain_of(0.1f) == Rgb(0.1f));
     CHECK(made == 1);
-    CHECK(gain_of(0.2f)->front() == Rgb(0.2f));
+    CHECK(gain_of(0.2f) == Rgb(0.2f));
     CHECK(made == 2);
-    cloud.drop_thin_gain();
-    CHECK(gain_of(0.2f)->front() == Rgb(0.2f));
+    cloud.drop_thinness();
+    CHECK(gain_of(0.2f) == Rgb(0.2f));
     CHECK(made == 3);
 }

@@ -34,10 +34,15 @@ PointSet middle() {
     return points;
 }
 
+std::vector<Rgb> gains_of(const RayScene& scene, const Medium& medium, float traced = 0.0f, float seen_through = 0.0f,
+                          PlacementMask mask = nullptr) {
+    return thinness(middle(), {}, scene, ThinMedium::of(medium, traced), seen_through, nullptr, mask).gain;
+}
+
 Rgb mean_gain(const Mesh& mesh, const Medium& medium, float traced = 0.0f, float seen_through = 0.0f) {
     const RayScene scene({mesh}, {Placement{}});
     Rgb sum(0.0f);
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium, traced, seen_through)) sum += gain / 64.0f;
+    for (const Rgb& gain : gains_of(scene, medium, traced, seen_through)) sum += gain / 64.0f;
     return sum;
 }
 
@@ -65,7 +70,7 @@ TEST_CASE("thickness: chords of a closed body end at its own other side, whateve
     const std::vector<std::uint8_t> itself = {1, 0};
     const auto mean = [&](PlacementMask mask) {
         Rgb sum(0.0f);
-        for (const Rgb& gain : thickness_gain(middle(), scene, medium, 0.0f, 0.0f, nullptr, mask)) sum += gain / 64.0f;
+        for (const Rgb& gain : gains_of(scene, medium, 0.0f, 0.0f, mask)) sum += gain / 64.0f;
         return sum;
     };
     CHECK(mean(&itself) == mean_gain(slab(0.1f), medium));
@@ -76,7 +81,7 @@ TEST_CASE("thickness: what is thick against its absorption, or has no other side
     const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.31f};
     for (const Mesh& mesh : {slab(30.0f), slab(0.01f, false)}) {
         const Rgb gain = mean_gain(mesh, medium);
-        for (int c = 0; c < 3; ++c) CHECK(gain[c] == doctest::Approx(1.0f).epsilon(1e-4));
+        for (int c = 0; c < 3; ++c) CHECK(gain[c] == doctest::Approx(1.0f).epsilon(0.005));  // rays sample directions
     }
 }
 
@@ -120,7 +125,7 @@ TEST_CASE(
     for (int c = 0; c < 3; ++c) {
         const double sigma = 50.0 + medium.sigma_a[c];
         const HalfSpaceAlbedo plane = half_space_albedo(50.0 / sigma, 1.0);
-        const double seen = (1.0 - straight(50.0) - once(50.0)) / (1.0 - white);
+        const double seen = (1.0 - straight(sigma) - once(50.0)) / (1.0 - white);
         CHECK(core[c] * plane.multiple * seen + straight(sigma) + once(sigma) ==
               doctest::Approx(all[c] * plane.all()).epsilon(0.02));
     }
@@ -131,15 +136,15 @@ TEST_CASE("thickness: what is seen straight through is not the core's, which kee
     const Medium medium{Rgb(50.0f), Rgb(0.0f, 5.0f, 25.0f), 1.0f};
     const RayScene scene({slab(thickness)}, {Placement{}});
     Rgb all(0.0f), core(0.0f);
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium)) all += gain / 64.0f;
-    for (const Rgb& gain : thickness_gain(middle(), scene, medium, 0.0f, 1.0f)) core += gain / 64.0f;
+    for (const Rgb& gain : gains_of(scene, medium)) all += gain / 64.0f;
+    for (const Rgb& gain : gains_of(scene, medium, 0.0f, 1.0f)) core += gain / 64.0f;
     CHECK(core.x == doctest::Approx(1.0f).epsilon(1e-4));
     const auto straight = [&](double sigma) {  // 2 E3(sigma thickness): what crosses the slab unscattered
         return integrate_gauss32([&](double mu) { return 2.0 * mu * std::exp(-sigma * thickness / mu); }, 0.0, 1.0);
     };
     for (int c = 1; c < 3; ++c) {
         const double sigma_a = medium.sigma_a[c], plane = half_space_albedo(50.0 / (50.0 + sigma_a), 1.0).all();
-        const double left = (all[c] * plane - straight(50.0 + sigma_a)) / (1.0 - straight(50.0));
+        const double left = (all[c] * plane - straight(50.0 + sigma_a)) / (1.0 - straight(50.0 + sigma_a));
         CHECK(core[c] * plane == doctest::Approx(left).epsilon(0.01));
     }
 }

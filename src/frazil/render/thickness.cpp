@@ -160,12 +160,16 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 const float more = sum / float(kAround) - light.half_space(depth * all_of);
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
-                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f;
+                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f, thick = 0.0f;
+                // These chords' mean of what a half space sends is what it returns, as the boundary lets it out.
+                for (const Chord& chord : chords) thick += light.returned(chord.cosine);
+                const float out = light.albedo() * static_cast<float>(chords.size()) / thick;
                 for (std::size_t i = 0; i < chords.size(); ++i) {
                     const float length = chords[i].length * all_of, way = places[i].way;
                     const float straight = std::exp(-length), filled = 1.0f - seen_through * straight;
                     const float scattered = scatter * places[i].metres / matched_once;
-                    const float sent = light.returned(chords[i].cosine * first_scattering_within(length));
+                    const float sent =
+                        std::min(out * light.returned(chords[i].cosine * first_scattering_within(length)), 1.0f);
                     absorbed += (1.0f - straight) * std::exp(-more) * (1.0f - sent);
                     plane += filled * sent;
                     traced_out += 1.0f - filled + once[c] * all_of / scatter * scattered * std::exp(-all_of * way);

@@ -24,6 +24,8 @@ class EvenLight {
     float half_space(float depth) const;
     // y: what a direction in which the body ends after so long a way adds to the mean over directions.
     float along(float length) const;
+    // What a half space returns of it.
+    float albedo() const { return albedo_; }
     // Radiance that a half space sends towards mu, the cosine inside; ∫ J(t mu) e^{-t} dt.
     float returned(float mu) const { return albedo_ * by_angle_(mu); }
 
