@@ -149,4 +149,16 @@ TEST_CASE("thickness: what is seen straight through is not the core's, which kee
     }
 }
 
+TEST_CASE("thickness: slabs of ice return what random walks do that its boundary reflects inside") {
+    // Walks from outside at cosines inside of 1, 0.8 and 0.66, averaged; alpha 0.99, 0.943 and 0.7; eta 1.31.
+    const Medium medium{Rgb(0.99f, 0.943f, 0.7f), Rgb(0.01f, 0.057f, 0.3f), 1.31f};
+    const ThinMedium thin = ThinMedium::of(medium, 0.0f);
+    for (const auto& [thickness, walked] :
+         {std::pair{0.5f, Rgb(0.981f, 0.904f, 0.686f)}, std::pair{2.0f, Rgb(0.931f, 0.701f, 0.292f)},
+          std::pair{5.0f, Rgb(0.847f, 0.497f, 0.146f)}}) {
+        const Rgb gain = mean_gain(slab(thickness), medium);
+        for (int c = 0; c < 3; ++c) CHECK(std::abs(gain[c] * thin.plane[c] - walked[c]) < 0.03f);
+    }
+}
+
 }  // namespace frazil

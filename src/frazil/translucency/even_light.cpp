@@ -8,7 +8,11 @@ namespace frazil {
 EvenLight::EvenLight(double alpha, double eta)
     : albedo_(static_cast<float>(half_space_albedo(alpha, eta).all())), by_angle_(alpha, eta) {
     if (!(alpha < 1.0) || !(alpha > 0.0)) return;
-    const HalfSpaceDepths source = half_space_absorbed(alpha, eta);
+    const HalfSpaceDepths source = half_space_absorbed(alpha);
+    // Where the boundary reflects, the surface of a half space scatters less, but a body that is thin absorbs as little: the
+    // exponent has further to go from the one to the other.
+    const double none = -std::log1p(-alpha);  // of a body without any extent
+    const double scale = 2.0 * (1.0 + std::log1p(-double(returned(0.0f))) / none);
     const std::size_t n = source.depths.size();
     first_ = static_cast<float>(std::log(source.depths.front()));
     steps_ = static_cast<float>(double(n - 1) / std::log(source.depths.back() / source.depths.front()));
@@ -17,8 +21,8 @@ EvenLight::EvenLight(double alpha, double eta)
     for (std::size_t i = 0; i < n; ++i) {
         const std::size_t before = i > 0 ? i - 1 : i, after = std::min(i + 1, n - 1);
         const double slope = (exponent[after] - exponent[before]) * double(steps_) / double(after - before);
-        half_space_.push_back(static_cast<float>(exponent[i]));
-        along_.push_back(static_cast<float>(2.0 * (exponent[i] - slope)));
+        half_space_.push_back(static_cast<float>(scale * exponent[i]));
+        along_.push_back(static_cast<float>(scale * 2.0 * (exponent[i] - slope)));
     }
 }
 

@@ -136,9 +136,9 @@ std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
 }  // namespace
 
 // Milne's equation for B = 1 - J, constant over cells about the depths: with nothing absorbed all light comes back, so that
-// B(t) = 1 - alpha + alpha/2 (∫ (1 - I) e^{-t/mu} dmu + ∫ B(s) E1(|t - s|) ds). B is 1 below the last cell.
-HalfSpaceDepths half_space_absorbed(double alpha, double eta) {
-    const SkyLight sky = sky_light(alpha, eta);
+// B(t) = 1 - alpha + alpha/2 ∫ B(s) E1(|t - s|) ds. B is 1 below the last cell.
+HalfSpaceDepths half_space_absorbed(double alpha) {
+    const Nodes nodes = cosine_nodes(0.0);
     // Diffusion's decay, in closed form; light of single scattering reaches further where albedos are low.
     const double decay = std::sqrt(3.0 * (1.0 - alpha)), deepest = 25.0 / std::min(decay, 1.0);
     const double step = std::log(deepest / kShallowest) / double(kDepths - 1);
@@ -148,17 +148,13 @@ HalfSpaceDepths half_space_absorbed(double alpha, double eta) {
         result.depths.push_back(kShallowest * std::exp(step * double(i)));
         edges.push_back(result.depths.back() * std::exp(0.5 * step));
     }
-    const auto e2 = [&](double depth) { return exponential_integral_2(sky.nodes, depth); };
+    const auto e2 = [&](double depth) { return exponential_integral_2(nodes, depth); };
     std::vector<double> matrix(kDepths * kDepths), right(kDepths);
     for (std::size_t i = 0; i < kDepths; ++i) {
         const double depth = result.depths[i];
         std::vector<double> to_edge;
         for (const double edge : edges) to_edge.push_back(e2(std::abs(edge - depth)));
-        double unlit = 0.0;
-        for (std::size_t j = 0; j < sky.inward.size(); ++j) {
-            unlit += sky.nodes.weight[j] * (1.0 - sky.inward[j]) * std::exp(-depth / sky.nodes.mu[j]);
-        }
-        right[i] = 1.0 - alpha + 0.5 * alpha * (unlit + to_edge[kDepths]);
+        right[i] = 1.0 - alpha + 0.5 * alpha * to_edge[kDepths];
         for (std::size_t j = 0; j < kDepths; ++j) {
             const double share = j == i ? 2.0 - to_edge[j] - to_edge[j + 1] : std::abs(to_edge[j] - to_edge[j + 1]);
             matrix[i * kDepths + j] = (i == j ? 1.0 : 0.0) - 0.5 * alpha * share;

@@ -20,13 +20,13 @@ struct HalfSpaceAlbedo {
 // For light from all around, cosine-distributed outside and refracted at the boundary.
 HalfSpaceAlbedo half_space_albedo(double alpha, double eta);
 
-// What is absorbed in the end of light that a half space scatters at a depth, under a uniform sky: by depths, in equal steps
+// What an index-matched half space under a uniform sky lacks of its radiance in the light that it scatters at a depth: by depths, in equal steps
 // of their logarithms from where it is as at the surface to where next to nothing leaves. 0 < alpha < 1.
 struct HalfSpaceDepths {
     std::vector<double> depths;    // optical
     std::vector<double> absorbed;  // 0..1
 };
-HalfSpaceDepths half_space_absorbed(double alpha, double eta);
+HalfSpaceDepths half_space_absorbed(double alpha);
 
 // How much of the light that enters at an angle leaves again, over the mean of light from all around; by reciprocity also
 // how the radiance that leaves under light from all around depends on the angle. 1 where nothing is absorbed. Tabulated, 1e-3.
