@@ -103,16 +103,11 @@ TEST_CASE("even light: what a place scatters is a product over directions, in sl
         Body body;
         Place place;
     };
-    const Case cases[] = {{"half space", half_space, {0.0, 1.0, 0.0}},
-                          {"edge", edge, {1e-4, 1e-4, 0.0}},
-                          {"face by an edge", edge, {1e-4, 1.0, 0.0}},
-                          {"inside an edge", edge, {1.0, 1.0, 0.0}},
-                          {"thin slab", slab(0.5), {0.0, 1e-4, 0.0}},
-                          {"slab", slab(2.0), {0.0, 1e-4, 0.0}},
-                          {"inside a slab", slab(2.0), {0.0, 1.0, 0.0}},
-                          {"thick slab", slab(5.0), {0.0, 1.0, 0.0}},
-                          {"small ball", ball(0.5), {0.0, 0.5, 0.0}},
-                          {"ball", ball(2.0), {0.0, 0.7, 0.0}},
+    const Case cases[] = {{"half space", half_space, {0.0, 1.0, 0.0}},   {"edge", edge, {1e-4, 1e-4, 0.0}},
+                          {"face by an edge", edge, {1e-4, 1.0, 0.0}},   {"inside an edge", edge, {1.0, 1.0, 0.0}},
+                          {"thin slab", slab(0.5), {0.0, 1e-4, 0.0}},    {"slab", slab(2.0), {0.0, 1e-4, 0.0}},
+                          {"inside a slab", slab(2.0), {0.0, 1.0, 0.0}}, {"thick slab", slab(5.0), {0.0, 1.0, 0.0}},
+                          {"small ball", ball(0.5), {0.0, 0.5, 0.0}},    {"ball", ball(2.0), {0.0, 0.7, 0.0}},
                           {"large ball", ball(5.0), {0.0, 1e-4, 0.0}}};
     for (const double alpha : {0.3, 0.7, 0.943, 0.99}) {
         const EvenLight light(alpha, 1.0);

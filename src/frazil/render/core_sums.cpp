@@ -55,7 +55,7 @@ CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below, cons
 }
 
 std::vector<Rgb> thin_exponents(const PointTree* thickness, const V3f* positions, std::size_t count,
-                                 const GatherOptions& options) {
+                                const GatherOptions& options) {
     if (!thickness) return {};
     const Gathered sums =
         thickness->gather(positions, count, {kThicknessTolerance * options.tolerance, Estimator::sum, false});

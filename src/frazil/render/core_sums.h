@@ -89,7 +89,7 @@ CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below, cons
 
 // The mean exponent of thin parts around each position, from such a tree; empty without one.
 std::vector<Rgb> thin_exponents(const PointTree* thickness, const V3f* positions, std::size_t count,
-                                 const GatherOptions& options);
+                                const GatherOptions& options);
 
 // Add the first `count` columns of a row, weighted, to those of another.
 inline void add_weighted(Rgb* sum, const Rgb* row, std::size_t count, float weight) {

@@ -5,8 +5,8 @@
 
 #include "frazil/base/morton_order.h"
 #include "frazil/base/parallel.h"
-#include "frazil/base/trigonometry.h"
 #include "frazil/base/sampler.h"
+#include "frazil/base/trigonometry.h"
 #include "frazil/render/chords.h"
 #include "frazil/render/drift.h"
 #include "frazil/translucency/fresnel.h"
@@ -70,7 +70,7 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
 }
 
 // Rays all around from the places below some points.
-constexpr int kAround = 32;
+constexpr int kAround = 64;
 
 std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which,
                                const ScrambledNet& net, const ChordFinder& finder) {

@@ -35,7 +35,7 @@ class EvenLight {
 
     float albedo_ = 1.0f;
     DirectionalAlbedo by_angle_;
-    float first_ = 0.0f, steps_ = 0.0f;         // ln of the first depth of the tables, steps per unit of ln
+    float first_ = 0.0f, steps_ = 0.0f;  // ln of the first depth of the tables, steps per unit of ln
     std::vector<float> half_space_, along_;
 };
 
