@@ -1,6 +1,7 @@
 #include "frazil/render/thickness.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "frazil/base/morton_order.h"
@@ -69,15 +70,24 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
     return places;
 }
 
-// Rays all around from the places below some points.
-constexpr int kAround = 64;
+// Rays all around from the place below a point: as many in all to a square of half the shortest free path.
+constexpr double kAround = 128.0;
+constexpr int kFewestAround = 16;
 
-std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which,
+int rays_around(const PointSet& points, const Medium& medium) {
+    double densest = 0.0;  // 1/m
+    for (int c = 0; c < 3; ++c) densest = std::max(densest, double(medium.sigma_s_prime[c]) + medium.sigma_a[c]);
+    const double apart = 2.0 * points.spacing * densest;
+    return std::bit_ceil(static_cast<unsigned>(std::clamp(kAround * apart * apart, double(kFewestAround), kAround)));
+}
+
+// `first` is the number of which[0] among all points.
+std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which, std::size_t first,
                                const ScrambledNet& net, const ChordFinder& finder) {
     std::vector<Ray> rays;
     std::vector<V2f> u(net.size());
     for (const std::uint32_t point : which) {
-        net.draw(kSeed + 3, point, u);
+        net.draw_part(kSeed + 3, static_cast<std::uint32_t>(first++), u);
         for (const V2f& sample : u) rays.push_back({places[point], uniform_sphere(sample)});
     }
     return finder.ways_out(rays);
@@ -128,7 +138,8 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
     Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
     const ChordFinder finder(scene, shells, mask);
-    const ScrambledNet net(kAround);
+    const ScrambledNet net(rays_around(points, medium));
+    const std::size_t around = net.size();
     std::vector<V3f> on_surface;
     if (below.empty()) {
         for (std::size_t k = 0; k < points.size(); ++k) {
@@ -140,14 +151,14 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
         const std::vector<Chord> all_chords = finder.find(points, which, kSeed);
-        const std::vector<float> all_ways = ways_around(below, which, net, finder);
+        const std::vector<float> all_ways = ways_around(below, which, begin, net, finder);
         const std::vector<OnceScattered> all_places =
             thin.traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
                                : std::vector<OnceScattered>(all_chords.size());
         for (std::size_t at = 0; at < which.size(); ++at) {
             const std::span chords = std::span(all_chords).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
             const std::span places = std::span(all_places).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
-            const std::span ways = std::span(all_ways).subspan(at * kAround, kAround);
+            const std::span ways = std::span(all_ways).subspan(at * around, around);
             const std::size_t k = which[at];
             if (!finder.is_closed(chords)) continue;
             const float depth = (below[k] - points.positions[k]).dot(-points.normals[k]);
@@ -157,7 +168,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 const EvenLight& light = thin.even_light[std::size_t(c)];
                 float sum = 0.0f;
                 for (const float way : ways) sum += light.along(way * all_of);
-                const float more = sum / float(kAround) - light.half_space(depth * all_of);
+                const float more = sum / float(around) - light.half_space(depth * all_of);
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
                 float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f, thick = 0.0f;
