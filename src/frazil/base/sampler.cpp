@@ -29,10 +29,9 @@ std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
     return reverse_bits(laine_karras(reverse_bits(x), seed));
 }
 
-// The second Sobol dimension; the first is the bit reversal. Its generator matrix, Pascal's triangle modulo 2, is a Kronecker
-// power, so that it takes one step per doubling of the bits.
-std::uint32_t sobol_second(std::uint32_t index) {
-    std::uint32_t x = reverse_bits(index);
+// The second Sobol dimension of an index whose bits are reversed, which are the first dimension. Its generator matrix,
+// Pascal's triangle modulo 2, is a Kronecker power, so that it takes one step per doubling of the bits.
+std::uint32_t sobol_second_of_reversed(std::uint32_t x) {
     x ^= x << 16;
     x ^= (x & 0x00ff00ffU) << 8;
     x ^= (x & 0x0f0f0f0fU) << 4;
@@ -41,25 +40,30 @@ std::uint32_t sobol_second(std::uint32_t index) {
     return x;
 }
 
+std::uint32_t sobol_second(std::uint32_t index) {
+    return sobol_second_of_reversed(reverse_bits(index));
+}
+
+// The first Sobol dimension, bits reversed, is the index itself.
 float first_of_pair(std::uint32_t index, std::uint32_t pair_seed) {
-    return to_unit_float(owen_scramble(reverse_bits(index), hash(pair_seed, 1U)));
+    return to_unit_float(reverse_bits(laine_karras(index, hash(pair_seed, 1U))));
 }
 
 }  // namespace
 
 Sampler::Sampler(std::uint32_t seed, std::uint32_t sequence, std::uint32_t sample)
-    : sequence_seed_(hash(seed, sequence)), sample_(sample) {}
+    : sequence_seed_(hash(seed, sequence)), reversed_sample_(reverse_bits(sample)) {}
 
 float Sampler::next_1d() {
     const std::uint32_t pair_seed = hash(sequence_seed_, dimension_++);
-    return first_of_pair(owen_scramble(sample_, pair_seed), pair_seed);
+    return first_of_pair(reverse_bits(laine_karras(reversed_sample_, pair_seed)), pair_seed);
 }
 
 V2f Sampler::next_2d() {
     const std::uint32_t pair_seed = hash(sequence_seed_, dimension_++);
-    const std::uint32_t index = owen_scramble(sample_, pair_seed);
-    const std::uint32_t y = owen_scramble(sobol_second(index), hash(pair_seed, 2U));
-    return {first_of_pair(index, pair_seed), to_unit_float(y)};
+    const std::uint32_t reversed = laine_karras(reversed_sample_, pair_seed);  // the scrambled index
+    const std::uint32_t y = owen_scramble(sobol_second_of_reversed(reversed), hash(pair_seed, 2U));
+    return {first_of_pair(reverse_bits(reversed), pair_seed), to_unit_float(y)};
 }
 
 ScrambledNet::ScrambledNet(int count) {

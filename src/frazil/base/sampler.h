@@ -29,7 +29,7 @@ class Sampler {
 
   private:
     std::uint32_t sequence_seed_;
-    std::uint32_t sample_;
+    std::uint32_t reversed_sample_;  // the bits of its index
     std::uint32_t dimension_ = 0;
 };
 

@@ -58,6 +58,19 @@ HWY_INLINE IntV find_bin(const float* cdf, IntV first, const std::uint32_t* guid
     }
 }
 
+// The same of one u, by the guide of this distribution: without gathers, which take as long for one as for all lanes.
+inline std::int32_t find_bin(const float* cdf, const std::uint32_t* guide, float u) {
+    const int interval = HWY_MIN(int(u * float(kEnvironmentGuides)), kEnvironmentGuides - 1);
+    auto bin = std::int32_t(guide[interval]), length = std::int32_t(guide[interval + 1]) - bin + 1;
+    while (length > 1) {
+        const std::int32_t half = length >> 1;
+        bin += cdf[bin + half] <= u ? half : 0;
+        length -= half;
+    }
+    while (bin > 0 && cdf[bin] == cdf[bin + 1]) --bin;
+    return bin;
+}
+
 // x in [0, 1] with density proportional to the line from a to b; a and b >= 0.
 HWY_INLINE FloatV sample_line(FloatV u, FloatV a, FloatV b) {
     const Float d;
@@ -95,6 +108,7 @@ struct Batch {
     HWY_ALIGN float across[kBatch], down[kBatch];
     HWY_ALIGN std::int32_t row[kBatch], column[kBatch];
     HWY_ALIGN float corner[12][kBatch];  // upper left, upper right, lower left, lower right; three channels each
+    HWY_ALIGN float top[kBatch], bottom[kBatch];  // cosines of the cell's upper and lower edge
     HWY_ALIGN float red[kBatch], green[kBatch], blue[kBatch], pdf[kBatch];
 
     void store(std::size_t i, const Color& color, FloatV density) {
@@ -104,8 +118,8 @@ struct Batch {
         hn::Store(color.b, d, blue + i);
         hn::Store(density, d, pdf + i);
     }
-    // Fetch the corners' pixels one by one: that waits for memory once, where gathers would wait for each.
-    void fetch_corners(const EnvironmentTables& tables, std::size_t count) {
+    // Fetch the corners' pixels and the edges one by one: that waits for memory once, where gathers would wait for each.
+    void fetch_cells(const EnvironmentTables& tables, std::size_t count) {
         const std::size_t width = std::size_t(tables.width);
         for (std::size_t i = 0; i < count; ++i) {
             const std::size_t above = std::size_t(row[i] > 0 ? row[i] - 1 : 0);
@@ -121,6 +135,7 @@ struct Batch {
             for (int k = 0; k < 4; ++k) {
                 corner[3 * k][i] = from[k]->x, corner[3 * k + 1][i] = from[k]->y, corner[3 * k + 2][i] = from[k]->z;
             }
+            top[i] = tables.row_cosine[row[i]], bottom[i] = tables.row_cosine[row[i] + 1];
         }
     }
 };
@@ -157,6 +172,18 @@ struct Draws {
     std::uint8_t from[kBatch];
 };
 
+// The edges of the bins that they fall into.
+struct Bins {
+    HWY_ALIGN float low[kBatch], high[kBatch];
+    void fetch(const float* cdf, std::size_t i) { low[i] = cdf[0], high[i] = cdf[1]; }
+};
+
+// How many elements the vectors have that hold `count` of a batch.
+HWY_INLINE std::size_t in_whole_vectors(std::size_t count) {
+    const std::size_t lanes = hn::Lanes(Float());
+    return (count + lanes - 1) / lanes * lanes;
+}
+
 // step(first lane) for every vector that holds one of `count` elements.
 template <class Step>
 HWY_INLINE void for_each_vector(std::size_t count, const Step& step) {
@@ -173,7 +200,7 @@ void eval_here(const EnvironmentTables& tables, std::span<const V3f> directions,
     Batch batch;
     for (std::size_t begin = 0; begin < directions.size(); begin += kBatch) {
         const std::size_t count = HWY_MIN(kBatch, directions.size() - begin);
-        for (std::size_t i = 0; i < kBatch; ++i) {
+        for (std::size_t i = 0; i < in_whole_vectors(count); ++i) {
             const V3f& direction = directions[begin + HWY_MIN(i, count - 1)];
             batch.x[i] = direction.x, batch.y[i] = direction.y, batch.z[i] = direction.z;
         }
@@ -192,12 +219,10 @@ void eval_here(const EnvironmentTables& tables, std::span<const V3f> directions,
             hn::Store(clamp01(hn::Sub(right, hn::ConvertTo(d, column))), d, batch.across + i);
             hn::Store(clamp01(hn::Sub(down, hn::ConvertTo(d, row))), d, batch.down + i);
         });
-        batch.fetch_corners(tables, count);
+        batch.fetch_cells(tables, count);
         for_each_vector(count, [&](std::size_t i) {
-            const IntV row = hn::Load(di, batch.row + i);
             const Cell cell(batch, i);
-            const FloatV top = hn::GatherIndex(d, tables.row_cosine, row);
-            const FloatV bottom = hn::GatherIndex(d, tables.row_cosine + 1, row);
+            const FloatV top = hn::Load(d, batch.top + i), bottom = hn::Load(d, batch.bottom + i);
             const FloatV down_cosine = clamp01(hn::Div(hn::Sub(top, hn::Load(d, batch.y + i)), hn::Sub(top, bottom)));
             const FloatV across = hn::Load(d, batch.across + i);
             batch.store(i, cell.radiance(across, hn::Load(d, batch.down + i)),
@@ -212,6 +237,14 @@ void eval_here(const EnvironmentTables& tables, std::span<const V3f> directions,
 
 // Row and column of the cell that each u falls into, for `count` of them.
 void find_cells(const EnvironmentTables& tables, Draws& draws, Batch& batch, std::size_t count) {
+    if (count == 1) {
+        const std::uint32_t* of_rows = tables.guides + std::size_t(tables.height + 1) * (kEnvironmentGuides + 1);
+        batch.row[0] = find_bin(tables.marginal_cdf, of_rows, draws.y[0]);
+        const std::size_t row = std::size_t(batch.row[0]);
+        batch.column[0] = find_bin(tables.conditional_cdf + row * (std::size_t(tables.width) + 1),
+                                   tables.guides + row * (kEnvironmentGuides + 1), draws.x[0]);
+        return;
+    }
     const Float d;
     const Int di;
     const IntV columns = hn::Set(di, tables.width + 1), guide_row = hn::Set(di, kEnvironmentGuides + 1);
@@ -276,37 +309,40 @@ void sample_here(const EnvironmentTables& tables, const V3f& normal, std::span<c
     const Float d;
     const Int di;
     const FloatV zero = hn::Zero(d), half = hn::Set(d, 0.5f), one = hn::Set(d, 1.0f);
-    const IntV columns = hn::Set(di, tables.width + 1);
     Batch batch;
     Draws draws;
+    Bins rows, columns;
     for (std::size_t begin = 0; begin < u.size(); begin += kBatch) {
         const std::size_t all = HWY_MIN(kBatch, u.size() - begin);
-        for (std::size_t i = 0; i < kBatch; ++i) {
+        for (std::size_t i = 0; i < in_whole_vectors(all); ++i) {
             const V2f& own = u[begin + HWY_MIN(i, all - 1)];
             draws.x[i] = own.x, draws.y[i] = own.y;
         }
         find_cells(tables, draws, batch, all);
         const std::size_t count = keep_above(tables, normal, draws, batch, all);
         if (count < all) std::fill_n(pdfs.data() + begin, all, 0.0f);
-        batch.fetch_corners(tables, count);
+        batch.fetch_cells(tables, count);
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t row = std::size_t(batch.row[i]);
+            rows.fetch(tables.marginal_cdf + row, i);
+            columns.fetch(tables.conditional_cdf + row * (std::size_t(tables.width) + 1) + std::size_t(batch.column[i]),
+                          i);
+        }
         for_each_vector(count, [&](std::size_t i) {
             const IntV row = hn::Load(di, batch.row + i), column = hn::Load(di, batch.column + i);
             const Cell cell(batch, i);
             // What is left of u within its bin becomes the place within the cell, by the slope between its corners.
-            const auto rest = [&](const float* cdf, IntV bin, FloatV value) {
-                const FloatV low = hn::GatherIndex(d, cdf, bin), high = hn::GatherIndex(d, cdf + 1, bin);
-                return clamp01(hn::Div(hn::Sub(value, low), hn::Sub(high, low)));
+            const auto rest = [&](const float* u, const Bins& bins) {
+                const FloatV low = hn::Load(d, bins.low + i), high = hn::Load(d, bins.high + i);
+                return clamp01(hn::Div(hn::Sub(hn::Load(d, u + i), low), hn::Sub(high, low)));
             };
             const FloatV* w = cell.weight;
-            const FloatV down_cosine = sample_line(rest(tables.marginal_cdf, row, hn::Load(d, draws.y + i)),
-                                                   hn::Add(w[0], w[1]), hn::Add(w[2], w[3]));
-            const FloatV across = sample_line(
-                rest(tables.conditional_cdf, hn::Add(hn::Mul(row, columns), column), hn::Load(d, draws.x + i)),
-                hn::Add(w[0], hn::Mul(hn::Sub(w[2], w[0]), down_cosine)),
-                hn::Add(w[1], hn::Mul(hn::Sub(w[3], w[1]), down_cosine)));
+            const FloatV down_cosine = sample_line(rest(draws.y, rows), hn::Add(w[0], w[1]), hn::Add(w[2], w[3]));
+            const FloatV across =
+                sample_line(rest(draws.x, columns), hn::Add(w[0], hn::Mul(hn::Sub(w[2], w[0]), down_cosine)),
+                            hn::Add(w[1], hn::Mul(hn::Sub(w[3], w[1]), down_cosine)));
 
-            const FloatV top = hn::GatherIndex(d, tables.row_cosine, row);
-            const FloatV bottom = hn::GatherIndex(d, tables.row_cosine + 1, row);
+            const FloatV top = hn::Load(d, batch.top + i), bottom = hn::Load(d, batch.bottom + i);
             const FloatV cosine = hn::Add(top, hn::Mul(down_cosine, hn::Sub(bottom, top)));
             const FloatV sine = hn::Sqrt(hn::Max(zero, hn::Sub(one, hn::Mul(cosine, cosine))));
             // From the left edge, at longitude +pi, to the right, and over the seam.

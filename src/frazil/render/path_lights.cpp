@@ -175,9 +175,8 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
                                   Sampler& sampler, Tile& tile) const {
     const float u_pick = sampler.next_1d();
     const V2f u = sampler.next_2d();
-    Path beyond = path;
-    beyond.pass_boundary();
-    if (lights_.is_empty() || beyond.light_share == Rgb(0.0f)) return;
+    const Rgb light_share = path.light_share_beyond();
+    if (lights_.is_empty() || light_share == Rgb(0.0f)) return;
     const LightReceiver receiver{surface.position, -surface.geometric_normal, surface.object};
     const LightSample sample = lights_.sample(receiver, u_pick, u, LightUse::refraction);
     if (!(sample.pdf > 0.0f) || sample.direction.dot(surface.geometric_normal) >= 0.0f) return;
@@ -203,7 +202,7 @@ void PathTracer::add_light_beyond(const Path& path, const Surface& surface, cons
     weights.scale(lobe);
     // Before the first lobe the boundary itself is the first.
     const std::size_t group = group_of_light_[std::size_t(sample.light)];
-    const Rgb radiance = sample.radiance * visible * beyond.light_share * (asked * mis / sample.pdf);
+    const Rgb radiance = sample.radiance * visible * light_share * (asked * mis / sample.pdf);
     deliver(path, Component::refraction, weights, group, radiance, tile);
     add_lpes_beyond(path, LpeKind::refraction, surface.object, sample.light, radiance * lobe, tile);
 }

@@ -161,15 +161,19 @@ struct Path {
         return true;
     }
 
-    // What it left behind when it went through a boundary: lights already served from the last opaque vertex.
+    // What it leaves behind when it goes through a boundary: lights already served from the last opaque vertex.
     void pass_boundary() {
-        if (!has_direct_light) return;
-        for (int c = 0; c < 3; ++c) {
+        light_share = light_share_beyond();
+        has_direct_light = false;
+    }
+    Rgb light_share_beyond() const {
+        Rgb share = light_share;
+        for (int c = 0; has_direct_light && c < 3; ++c) {
             const float all = last.diffuse[c] + last.specular[c] + last.refraction[c];
             const float served = is_glossy ? last.diffuse[c] : last.diffuse[c] + last.specular[c];
-            light_share[c] *= all > 0.0f ? 1.0f - served / all : 0.0f;
+            share[c] *= all > 0.0f ? 1.0f - served / all : 0.0f;
         }
-        has_direct_light = false;
+        return share;
     }
 
     // How many lights are asked at the vertex that it has come to.
