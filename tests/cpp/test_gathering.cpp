@@ -158,9 +158,9 @@ TEST_CASE("gathering: what the camera sees itself is gathered there, overlays in
 TEST_CASE("gathering: places of a pixel share a gather within half a spacing, however far a mean free path is") {
     const LayeredBall ball(0.05f, 1.0f, false);
     const float spacing = ball.bodies[0]->spacing;
-    const auto gathers = [&](float apart) {
+    const auto gathers = [&](float begin, float apart) {
         Tile tile(1, ball.layout.groups.size(), ball.layout.plane_count());
-        for (const float x : {0.1f * spacing, 0.1f * spacing + apart}) {
+        for (const float x : {begin, begin + apart}) {
             GatherRequest request;
             request.is_primary = true;
             request.position = V3f(x, 0.0f, 1.0f);
@@ -170,8 +170,12 @@ TEST_CASE("gathering: places of a pixel share a gather within half a spacing, ho
         Gathering(ball.scene, ball.bodies, ball.layout).answer({}, tile);
         return tile.gathers;
     };
-    CHECK(gathers(0.2f * spacing) == 1);
-    CHECK(gathers(0.6f * spacing) == 2);
+    for (const float begin : {0.1f, 0.4f, 0.45f, 0.6f, 0.97f}) {
+        CHECK(gathers(begin * spacing, 0.2f * spacing) == 1);
+        CHECK(gathers(begin * spacing, 0.49f * spacing) == 1);
+        CHECK(gathers(begin * spacing, 0.51f * spacing) == 2);
+        CHECK(gathers(begin * spacing, 0.6f * spacing) == 2);
+    }
 }
 
 TEST_CASE("gathering: layers of compensations leave the light as it is rendered to the bit") {

@@ -55,6 +55,7 @@ Covering eval_overlays(std::span<const Overlay> overlays, float age, float rough
 struct CoveringSlope {
     float covered = 0.0f, scattered = 0.0f;
     Rgb reflectance = Rgb(0.0f), tint = Rgb(0.0f);
+    bool operator==(const CoveringSlope&) const = default;
 };
 
 // One for each overlay, of the opacities that eval_overlays tells.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <span>
 
-#include "frazil/base/random.h"
+#include "frazil/render/place_cells.h"
 
 namespace frazil {
 namespace {
@@ -35,11 +35,18 @@ Places shared_places(std::span<GatherRequest* const> requests, float cell, std::
         std::uint32_t request;
     };
     std::vector<Key> keys;
-    for (std::uint32_t i = 0; i < requests.size(); ++i) {
-        if (row_of[i] != kNoRow) continue;
-        const V3f at = requests[i]->position / cell;
-        const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
-        keys.push_back({std::uint64_t(requests[i]->pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
+    // Pixel by pixel: their requests lie side by side.
+    for (std::uint32_t begin = 0, end = 0; begin < requests.size(); begin = end) {
+        const std::uint32_t pixel = requests[begin]->pixel;
+        Box3f box;
+        for (end = begin; end < requests.size() && requests[end]->pixel == pixel; ++end) {
+            if (row_of[end] == kNoRow) box.extendBy(requests[end]->position);
+        }
+        const PlaceCells cells(box, cell);
+        for (std::uint32_t i = begin; i < end; ++i) {
+            if (row_of[i] == kNoRow)
+                keys.push_back({std::uint64_t(pixel) << 32 | cells.cell(requests[i]->position), i});
+        }
     }
     std::sort(keys.begin(), keys.end(),
               [](const Key& a, const Key& b) { return a.hash != b.hash ? a.hash < b.hash : a.request < b.request; });
@@ -230,10 +237,13 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
             for (std::size_t group = 0; group < exitance.groups(); ++group) {
                 Rgb light = exitance(scales, group);
                 if (group == request.entering_group) light += fill;
-                tile.add(request.pixel, Component::translucency, group, light * request.translucency);
-                tile.add(request.pixel, Component::diffuse, group, light * request.diffuse);
-                tile.add(request.pixel, Component::specular, group, light * request.specular);
-                tile.add(request.pixel, Component::refraction, group, light * request.refraction);
+                const auto add = [&](Component component, const Rgb& weight) {
+                    if (weight != Rgb(0.0f)) tile.add(request.pixel, component, group, light * weight);
+                };
+                add(Component::translucency, request.translucency);
+                add(Component::diffuse, request.diffuse);
+                add(Component::specular, request.specular);
+                add(Component::refraction, request.refraction);
                 for (const auto& [lpe, state, weight] : request.lpes) {
                     if (!layout_.lpes[lpe].ends_in_group(state, group)) continue;
                     tile.add_lpe(request.pixel, lpe, light * weight);
@@ -277,12 +287,13 @@ void Gathering::add_overlays(const GatherRequest& request, const Answer& answer,
         for (std::size_t group = 0; group < exitance.groups(); ++group) {
             Rgb light = exitance.below(group) * gain;
             if (group == request.entering_group) light += fill;
-            const auto add = [&](FilmLayout::OverlayPlane plane, const Rgb& change) {
-                tile.add_to_plane(request.pixel, overlay.plane + plane, group, change);
+            const auto add = [&](FilmLayout::OverlayPlane plane, const Rgb& weight, const Rgb& change) {
+                if (weight == Rgb(0.0f)) return;
+                tile.add_to_plane(request.pixel, overlay.plane + plane, group, light * weight * change);
             };
-            add(FilmLayout::kDiffuse, light * request.diffuse * overlay.diffuse);
-            add(FilmLayout::kTranslucency, light * overlay.core * request.translucency);
-            add(FilmLayout::kRefraction, light * request.refraction * overlay.seen_through);
+            add(FilmLayout::kDiffuse, request.diffuse, overlay.diffuse);
+            add(FilmLayout::kTranslucency, request.translucency, overlay.core);
+            add(FilmLayout::kRefraction, request.refraction, overlay.seen_through);
         }
     }
     if (is_taken_from) add_taken(request, answer, gain, tile);

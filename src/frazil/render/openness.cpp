@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "frazil/base/morton_order.h"
-#include "frazil/base/random.h"
 #include "frazil/base/trigonometry.h"
+#include "frazil/render/place_cells.h"
 #include "frazil/translucency/normalized_diffusion.h"
 
 namespace frazil {
@@ -115,15 +115,16 @@ void Openness::blend(const Points& points, std::span<const SeenPlace> places, Ti
     const float size = kCell / kReach * points.reach();
     std::vector<Key> keys;
     keys.reserve(places.size());
-    for (std::uint32_t i = 0; i < places.size(); ++i) {
-        const V3f at = places[i].position / size;
-        const auto bits = [](float x) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(x))); };
-        keys.push_back({std::uint64_t(places[i].pixel) << 32 | hash(bits(at.x), bits(at.y), bits(at.z)), i});
-    }
     // Pixel by pixel: their places lie side by side.
-    for (auto first = keys.begin(), last = first; first != keys.end(); first = last) {
-        last = std::find_if(first, keys.end(), [&](const Key& key) { return key.cell >> 32 != first->cell >> 32; });
-        std::sort(first, last,
+    for (std::uint32_t begin = 0, end = 0; begin < places.size(); begin = end) {
+        const std::uint32_t pixel = places[begin].pixel;
+        Box3f box;
+        for (end = begin; end < places.size() && places[end].pixel == pixel; ++end) box.extendBy(places[end].position);
+        const PlaceCells cells(box, size);
+        for (std::uint32_t i = begin; i < end; ++i) {
+            keys.push_back({std::uint64_t(pixel) << 32 | cells.cell(places[i].position), i});
+        }
+        std::sort(keys.begin() + begin, keys.end(),
                   [](const Key& a, const Key& b) { return a.cell != b.cell ? a.cell < b.cell : a.place < b.place; });
     }
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {

@@ -23,9 +23,10 @@ std::vector<OverlayShare> overlay_shares(const Surface& surface, const std::vect
     const float bare = std::max(kNothing, 1.0f - covering.covered),
                 entering = std::max(kNothing, 1.0f - covering.scattered);
     std::vector<OverlayShare> shares;
-    // Those that are not here count too: light to the points around here is theirs.
+    shares.reserve(slopes.size());
     for (std::uint32_t k = 0; k < slopes.size(); ++k) {
         const CoveringSlope& slope = slopes[k];
+        if (slope == CoveringSlope()) continue;
         const float seen_through = -slope.covered / bare;
         shares.push_back({k, over(slope.reflectance, covering.reflectance), over(slope.tint, covering.tint),
                           Rgb(seen_through), seen_through + slope.scattered / entering});

@@ -23,6 +23,7 @@ struct OverlayShare {
     float clearness = 0.0f;  // of what the core leaves out for what is seen through
 };
 
+// Of those that are there, by what the covering's slopes tell.
 std::vector<OverlayShare> overlay_shares(const Surface& surface, const std::vector<CoveringSlope>& slopes);
 
 // A share's change of light from the core, of which `share` is not seen through.
