@@ -86,6 +86,11 @@ TEST_CASE("environment: many at once are the same bits as one at a time, and non
             std::vector<V3f> above(u.size(), V3f(0.0f));
             env.sample_many(n, u, above, found, seen);
             for (std::size_t i = 0; i < u.size(); ++i) {
+                V3f alone;
+                float pdf;
+                Rgb radiance;
+                env.sample_many(n, {&u[i], 1}, {&alone, 1}, {&pdf, 1}, {&radiance, 1});
+                CHECK(pdf == found[i]);
                 if (found[i] == 0.0f) {
                     ++left_out;
                     CHECK(directions[i].dot(n) < 0.0f);

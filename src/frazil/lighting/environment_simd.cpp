@@ -239,10 +239,12 @@ void eval_here(const EnvironmentTables& tables, std::span<const V3f> directions,
 void find_cells(const EnvironmentTables& tables, Draws& draws, Batch& batch, std::size_t count) {
     if (count == 1) {
         const std::uint32_t* of_rows = tables.guides + std::size_t(tables.height + 1) * (kEnvironmentGuides + 1);
-        batch.row[0] = find_bin(tables.marginal_cdf, of_rows, draws.y[0]);
-        const std::size_t row = std::size_t(batch.row[0]);
-        batch.column[0] = find_bin(tables.conditional_cdf + row * (std::size_t(tables.width) + 1),
-                                   tables.guides + row * (kEnvironmentGuides + 1), draws.x[0]);
+        const std::int32_t row = find_bin(tables.marginal_cdf, of_rows, draws.y[0]);
+        const std::int32_t column =
+            find_bin(tables.conditional_cdf + std::size_t(row) * (std::size_t(tables.width) + 1),
+                     tables.guides + std::size_t(row) * (kEnvironmentGuides + 1), draws.x[0]);
+        std::fill_n(batch.row, in_whole_vectors(count), row);
+        std::fill_n(batch.column, in_whole_vectors(count), column);
         return;
     }
     const Float d;

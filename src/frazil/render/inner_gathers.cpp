@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kCell = 0.4;                             // in mean free paths
 constexpr std::int64_t kCells = 4, kNodes = kCells + 1;   // of a brick, along an axis
+constexpr float kTolerance = 4.0f;                        // of gathers at the nodes, times the render's
 constexpr std::size_t kMostBytes = std::size_t(1) << 28;  // that a body's bricks take
 
 }  // namespace
@@ -22,6 +23,7 @@ std::size_t InnerGathers::PlaceHash::operator()(const Place& place) const {
 InnerGathers::InnerGathers(const Body& body, std::size_t groups, const GatherOptions& options)
     : trees_(body.trees), options_(options) {
     trees_.overlays = nullptr;
+    options_.tolerance *= kTolerance;
     columns_ = columns_of(trees_, groups, options.ramp_layers ? body.material->ramp.distances.size() : 0);
     cell_ = kCell * double(body.mean_free_path());
     most_bricks_per_shelf_ = kMostBytes / kShelves / (kNodes * kNodes * kNodes * columns_.count() * sizeof(Rgb));
