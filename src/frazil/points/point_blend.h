@@ -25,32 +25,27 @@ class PointBlend {
     // The points' indices as `visit` numbers them.
     std::vector<std::uint32_t> order() const { return lookup_.order(); }
 
-    // A visit's steps, as PointLookup has them.
-    PointLookup::Around around(const V3f& position) const { return lookup_.around(position); }
-    template <class Ahead>
-    void fetch(const PointLookup::Around& around, const Ahead& ahead) const {
-        lookup_.fetch(around, ahead);
-    }
     // visit(k, weight) for each point around a place with this outward normal; returns the sum of weights, 0
     // where there is none.
     template <class Visit>
-    float visit(const PointLookup::Around& around, const V3f& position, const V3f& normal, const Visit& visit) const {
-        float sum = 0.0f;
-        lookup_.visit(around, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
-            const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
-            if (!(facing > 0.0f && q > 0.0f)) return;
-            const float weight = facing * q * q;
-            sum += weight;
-            visit(point, weight);
-        });
-        return sum;
-    }
-    // All of them.
-    template <class Visit>
     float visit(const V3f& position, const V3f& normal, const Visit& visit) const {
-        const PointLookup::Around here = around(position);
-        fetch(here, [](std::uint32_t, std::uint32_t) {});
-        return this->visit(here, position, normal, visit);
+        return this->visit(position, normal, visit, [](std::uint32_t, std::uint32_t) {});
+    }
+    // The same; ahead(k, count) for runs of points before any is visited (PointLookup::visit).
+    template <class Visit, class Ahead>
+    float visit(const V3f& position, const V3f& normal, const Visit& visit, const Ahead& ahead) const {
+        float sum = 0.0f;
+        lookup_.visit(
+            position,
+            [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
+                const float facing = n.dot(normal), q = 1.0f - (p - position).length2() / (reach_ * reach_);
+                if (!(facing > 0.0f && q > 0.0f)) return;
+                const float weight = facing * q * q;
+                sum += weight;
+                visit(point, weight);
+            },
+            ahead);
+        return sum;
     }
 
   private:

@@ -1,6 +1,5 @@
 #include "frazil/points/point_lookup.h"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 
@@ -67,20 +66,6 @@ PointLookup::At PointLookup::locate(const V3f& position) const {
         at.beyond[axis] = {within * within, 0.0f, (1.0f - within) * (1.0f - within)};
     }
     return at;
-}
-
-PointLookup::Around PointLookup::around(const V3f& position) const {
-    const At at = locate(position);
-    Around result;
-    const auto begin = result.buckets.begin();
-    for (const auto& neighbour : kNeighbours) {
-        if (at.distance2(neighbour) > 1.0f) continue;
-        const std::uint32_t b = bucket(at, neighbour);
-        if (std::find(begin, begin + result.count, b) != begin + result.count) continue;
-        result.buckets[result.count++] = b;
-        __builtin_prefetch(&first_[b]);
-    }
-    return result;
 }
 
 std::uint32_t PointLookup::nearest(const V3f& position, const V3f& normal) const {

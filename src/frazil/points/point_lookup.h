@@ -5,6 +5,7 @@
 // Not: places off the surface.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -29,26 +30,13 @@ class PointLookup {
     // The points' indices in the order of the lookup, in which those near to each other mostly are neighbours.
     std::vector<std::uint32_t> order() const;
 
-    // The buckets that points around a place are in; those that distant cells share are there once.
-    struct Around {
-        std::array<std::uint32_t, 27> buckets;
-        std::size_t count = 0;
-    };
-    // A visit's three steps, each of which asks for the memory that the next one reads: what visits many places takes each
-    // step for some of them at once.
-    Around around(const V3f& position) const;
-    // ahead(k, count) for each run of points that are about to be visited, so that the caller's memory can be asked for too.
-    template <class Ahead>
-    void fetch(const Around& around, const Ahead& ahead) const;
     // visit(index, k, position, normal), once for every point within reach and for some beyond; index = order()[k].
-    template <class Visit>
-    void visit(const Around& around, const Visit& visit) const;
-    // All three.
+    // Before any, ahead(k, count) for each run of points that are about to be visited, so that their memory can be asked for.
+    template <class Visit, class Ahead>
+    void visit(const V3f& position, const Visit& visit, const Ahead& ahead) const;
     template <class Visit>
     void visit(const V3f& position, const Visit& visit) const {
-        const Around here = around(position);
-        fetch(here, [](std::uint32_t, std::uint32_t) {});
-        this->visit(here, visit);
+        this->visit(position, visit, [](std::uint32_t, std::uint32_t) {});
     }
 
   private:
@@ -88,21 +76,28 @@ class PointLookup {
     std::vector<V3f> normals_;          // in the same order
 };
 
-template <class Ahead>
-void PointLookup::fetch(const Around& around, const Ahead& ahead) const {
-    for (std::size_t i = 0; i < around.count; ++i) {
-        const std::uint32_t first = first_[around.buckets[i]], last = first_[around.buckets[i] + 1];
-        if (first == last) continue;
+template <class Visit, class Ahead>
+void PointLookup::visit(const V3f& position, const Visit& visit, const Ahead& ahead) const {
+    const At at = locate(position);
+    std::array<std::uint32_t, 27> buckets;  // those that distant cells share are visited once
+    std::size_t count = 0;
+    // Ask for all of the memory before any of it is waited for.
+    for (const auto& neighbour : kNeighbours) {
+        if (at.distance2(neighbour) > 1.0f) continue;
+        const std::uint32_t b = bucket(at, neighbour);
+        if (std::find(buckets.begin(), buckets.begin() + count, b) != buckets.begin() + count) continue;
+        buckets[count++] = b;
+        __builtin_prefetch(&first_[b]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint32_t first = first_[buckets[i]];
+        if (first == first_[buckets[i] + 1]) continue;
         __builtin_prefetch(&entries_[first]);
         __builtin_prefetch(&normals_[first]);
-        ahead(first, last - first);
+        ahead(first, first_[buckets[i] + 1] - first);
     }
-}
-
-template <class Visit>
-void PointLookup::visit(const Around& around, const Visit& visit) const {
-    for (std::size_t i = 0; i < around.count; ++i) {
-        for (std::uint32_t k = first_[around.buckets[i]]; k < first_[around.buckets[i] + 1]; ++k) {
+    for (std::size_t i = 0; i < count; ++i) {
+        for (std::uint32_t k = first_[buckets[i]]; k < first_[buckets[i] + 1]; ++k) {
             visit(entries_[k].index, k, entries_[k].position, normals_[k]);
         }
     }

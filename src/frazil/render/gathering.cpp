@@ -1,7 +1,6 @@
 #include "frazil/render/gathering.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <span>
 
@@ -17,9 +16,6 @@ constexpr float kCell = 0.5f;
 
 // The light that fills up is asked by chance where it brings less: of what a white diffuse surface in front of the camera gets.
 constexpr float kFaintFill = 0.005f;
-
-// Blends that wait for memory together.
-constexpr std::size_t kBlendsAtOnce = 8;
 
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
@@ -158,28 +154,14 @@ Gathering::Answers Gathering::answers_for(const Body& body, Requests requests, c
     }
     CoreSums blended(columns);
     for (std::uint32_t i = 0; i < requests.size() && body.at_points; ++i) {
-        if (!requests[i]->is_primary) is_blended.push_back(i);
-    }
-    struct Place {
-        V3f position, normal;
-        PointLookup::Around around;
-    };
-    std::array<Place, kBlendsAtOnce> places_at_once;
-    for (std::size_t begin = 0; begin < is_blended.size(); begin += kBlendsAtOnce) {
-        const std::size_t count = std::min(kBlendsAtOnce, is_blended.size() - begin);
-        for (std::size_t k = 0; k < count; ++k) {
-            Place& place = places_at_once[k];
-            const GatherRequest& request = *requests[is_blended[begin + k]];
-            place.position = request.position * body.to_points;
-            body.to_points.multDirMatrix(request.normal, place.normal);
-            place.around = body.at_points->around(place.position, place.normal);
-        }
-        for (std::size_t k = 0; k < count; ++k) body.at_points->fetch(places_at_once[k].around);
-        for (std::size_t k = 0; k < count; ++k) {
-            const auto& [position, normal, around] = places_at_once[k];
-            if (!body.at_points->append(around, position, normal, blended)) body.inside->append(position, blended);
-            row_of[is_blended[begin + k]] = static_cast<std::uint32_t>(blended.size() - 1);
-        }
+        const GatherRequest& request = *requests[i];
+        if (request.is_primary) continue;
+        const V3f position = request.position * body.to_points;
+        V3f normal;
+        body.to_points.multDirMatrix(request.normal, normal);
+        if (!body.at_points->append(position, normal, blended)) body.inside->append(position, blended);
+        row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
+        is_blended.push_back(i);
     }
     const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
     CoreSums sums =

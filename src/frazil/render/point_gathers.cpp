@@ -44,34 +44,20 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     return result;
 }
 
-PointLookup::Around PointGathers::around(const V3f& position, const V3f& normal) const {
-    return normal == V3f(0.0f) ? PointLookup::Around() : blend_.around(position);
-}
-
-void PointGathers::fetch(const PointLookup::Around& around) const {
-    // Rows of a run lie side by side.
-    blend_.fetch(around, [&](std::uint32_t point, std::uint32_t points) {
-        const auto* bytes = reinterpret_cast<const char*>(at_points_.row(point));
-        for (std::size_t at = 0; at < points * columns().count() * sizeof(Rgb); at += 64) {
-            __builtin_prefetch(bytes + at);
-        }
-    });
-}
-
 bool PointGathers::append(const V3f& position, const V3f& normal, CoreSums& rows) const {
-    const PointLookup::Around here = around(position, normal);
-    fetch(here);
-    return append(here, position, normal, rows);
-}
-
-bool PointGathers::append(const PointLookup::Around& around, const V3f& position, const V3f& normal,
-                          CoreSums& rows) const {
+    if (normal == V3f(0.0f)) return false;
     const std::size_t count = columns().count();
     Rgb* row = nullptr;
-    const float sum = blend_.visit(around, position, normal, [&](std::uint32_t point, float weight) {
+    const auto add = [&](std::uint32_t point, float weight) {
         if (!row) row = rows.add_row();
         add_weighted(row, at_points_.row(point), count, weight);
-    });
+    };
+    // Rows of a run lie side by side.
+    const auto ask = [&](std::uint32_t point, std::uint32_t points) {
+        const auto* bytes = reinterpret_cast<const char*>(at_points_.row(point));
+        for (std::size_t at = 0; at < points * count * sizeof(Rgb); at += 64) __builtin_prefetch(bytes + at);
+    };
+    const float sum = blend_.visit(position, normal, add, ask);
     if (!row) return false;
     const float scale = 1.0f / sum;
     for (std::size_t k = 0; k < count; ++k) row[k] *= scale;

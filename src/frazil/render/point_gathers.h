@@ -41,10 +41,6 @@ class PointGathers {
     // Append the row of a place on the surface with this outward normal; false where no point is near. `rows` begin with these
     // columns.
     bool append(const V3f& position, const V3f& normal, CoreSums& rows) const;
-    // Its steps: who appends many rows takes each for some places at once, so that they wait for memory together.
-    PointLookup::Around around(const V3f& position, const V3f& normal) const;
-    void fetch(const PointLookup::Around& around) const;
-    bool append(const PointLookup::Around& around, const V3f& position, const V3f& normal, CoreSums& rows) const;
 
   private:
     PointGathers(PointBlend blend, const SumColumns& columns) : blend_(std::move(blend)), at_points_(columns) {}
