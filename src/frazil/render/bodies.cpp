@@ -157,7 +157,8 @@ void add_room(std::size_t object, const Body& body, const RayScene& scene, const
     points.cloud().add_room(body.sigma_t(), body.depth(), [&] {
         std::vector<std::uint8_t> itself(object + 1, 0);
         itself[object] = 1;
-        return room_of(points.in_world(), ChordFinder(scene, shells, &itself), body.sigma_t());
+        const int chords = rays_each(points.in_world(), body.sigma_t(), ChordFinder::kMost, ChordFinder::kFewest);
+        return room_of(points.in_world(), ChordFinder(scene, shells, &itself, chords), body.sigma_t());
     });
 }
 

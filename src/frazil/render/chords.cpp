@@ -1,13 +1,22 @@
 #include "frazil/render/chords.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "frazil/base/trigonometry.h"
 
 namespace frazil {
-ChordFinder::ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask)
-    : scene_(scene), shells_(shells), mask_(mask), net_(kChords) {}
+
+int rays_each(const PointSet& points, float sigma_t, int most, int fewest) {
+    if (!(points.spacing > 0.0f)) return most;
+    const double apart = 2.0 * points.spacing * double(sigma_t);
+    const double many = std::clamp(most * apart * apart, double(fewest), double(most));
+    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(many)));
+}
+
+ChordFinder::ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask, int chords)
+    : scene_(scene), shells_(shells), mask_(mask), net_(chords) {}
 
 void ChordFinder::draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& u) const {
     u.resize(net_.size());
@@ -15,14 +24,14 @@ void ChordFinder::draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& 
 }
 
 std::vector<Chord> ChordFinder::find(const PointSet& points, std::span<const std::uint32_t> which,
-                                     std::uint32_t seed) const {
+                                     std::size_t first, std::uint32_t seed) const {
     std::vector<Chord> chords;
     std::vector<Ray> rays;
-    std::vector<V2f> u;
+    std::vector<V2f> u(net_.size());
     for (const std::uint32_t point : which) {
         const V3f inward = -points.normals[point], origin = offset_origin(points.positions[point], inward);
         const auto [s, t] = tangent_frame(inward);
-        draw(seed, point, u);
+        net_.draw_part(seed, static_cast<std::uint32_t>(first++), u);
         for (const V2f& sample : u) {
             const V3f local = cosine_hemisphere(sample);
             rays.push_back({origin, s * local.x + t * local.y + inward * local.z});

@@ -21,21 +21,29 @@ struct Chord {
     float length = 0.0f;  // infinite where there is no other side
 };
 
+// How many rays each point sends where so many in all, `most`, go to a square of half a free path, which they tell of together:
+// a power of two. `most` where the points' spacing is not known.
+int rays_each(const PointSet& points, float sigma_t, int most, int fewest);
+
 class ChordFinder {
   public:
-    // `shells` that are one body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
-    // Both, and the scene, must outlive this; they may be null.
-    ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask);
+    static constexpr int kMost = 16, kFewest = 4;  // chords from each point
 
-    // Chords from each of some points.
-    static constexpr std::size_t kChords = 16;
-    // Those of which[0], then of which[1] ...: more at a time take less time each.
-    std::vector<Chord> find(const PointSet& points, std::span<const std::uint32_t> which, std::uint32_t seed) const;
+    // `shells` that are one body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
+    // Both, and the scene, must outlive this; they may be null. `chords`, from each point, is a power of two.
+    ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask, int chords = kMost);
+
+    // Chords from each point.
+    std::size_t chords() const { return net_.size(); }
+    // Those of which[0], then of which[1] ...: more at a time take less time each. which[0] is the `first` of all points along
+    // a curve on which neighbours are near each other in space: they share one sequence.
+    std::vector<Chord> find(const PointSet& points, std::span<const std::uint32_t> which, std::size_t first,
+                            std::uint32_t seed) const;
     // Whether chords of a point tell of a closed body: one by itself has another side on all of them.
     bool is_closed(std::span<const Chord> chords) const;
     // How far it is along rays from inside to where the body ends; infinite where it does not.
     std::vector<float> ways_out(std::span<const Ray> rays) const;
-    // Quasi-random numbers, one per chord.
+    // Quasi-random numbers, one per chord, of which points' are independent.
     void draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& u) const;
 
   private:

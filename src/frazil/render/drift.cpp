@@ -172,10 +172,10 @@ Room room_of(const PointSet& points, const ChordFinder& finder, float sigma_t) {
     const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
-        const std::vector<Chord> all = finder.find(points, which, kSeed);
+        const std::vector<Chord> all = finder.find(points, which, begin, kSeed);
         for (std::size_t i = 0; i < which.size(); ++i) {
             float inwards = 0.0f, along = 0.0f, cosines = 0.0f, squares = 0.0f;
-            for (const Chord& chord : std::span(all).subspan(i * ChordFinder::kChords, ChordFinder::kChords)) {
+            for (const Chord& chord : std::span(all).subspan(i * finder.chords(), finder.chords())) {
                 const float square = 1.0f - chord.cosine * chord.cosine;
                 cosines += chord.cosine;
                 squares += square;

@@ -1,7 +1,6 @@
 #include "frazil/render/thickness.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "frazil/base/morton_order.h"
@@ -52,11 +51,11 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
     std::vector<std::size_t> index;  // of each ray
     std::vector<V2f> u, u_away;
     for (std::size_t at = 0; at < which.size(); ++at) {
-        const std::size_t first = at * ChordFinder::kChords;
-        if (!finder.is_closed(chords.subspan(first, ChordFinder::kChords))) continue;
+        const std::size_t first = at * finder.chords();
+        if (!finder.is_closed(chords.subspan(first, finder.chords()))) continue;
         finder.draw(kSeed + 1, which[at], u);
         finder.draw(kSeed + 2, which[at], u_away);
-        for (std::size_t i = 0; i < ChordFinder::kChords; ++i) {
+        for (std::size_t i = 0; i < finder.chords(); ++i) {
             const Chord& chord = chords[first + i];
             OnceScattered& place = places[first + i];
             place = draw_place(chord, sigma_s, u[i]);
@@ -70,15 +69,12 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
     return places;
 }
 
-// Rays all around from the place below a point: as many in all to a square of half the shortest free path.
-constexpr double kAround = 128.0;
-constexpr int kFewestAround = 16;
+// Rays all around from the place below each point.
+constexpr int kMostAround = 64, kFewestAround = 4;
 
-int rays_around(const PointSet& points, const Medium& medium) {
-    double densest = 0.0;  // 1/m
-    for (int c = 0; c < 3; ++c) densest = std::max(densest, double(medium.sigma_s_prime[c]) + medium.sigma_a[c]);
-    const double apart = 2.0 * points.spacing * densest;
-    return std::bit_ceil(static_cast<unsigned>(std::clamp(kAround * apart * apart, double(kFewestAround), kAround)));
+float densest(const Medium& medium) {
+    const Rgb sigma_t = medium.sigma_s_prime + medium.sigma_a;
+    return std::max({sigma_t.x, sigma_t.y, sigma_t.z});
 }
 
 // `first` is the number of which[0] among all points.
@@ -137,8 +133,10 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     // Of light that is scattered once in an index-matched half space, from all around [Chandrasekhar1960].
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
     Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
-    const ChordFinder finder(scene, shells, mask);
-    const ScrambledNet net(rays_around(points, medium));
+    const float sigma_t = densest(medium);
+    const ChordFinder finder(scene, shells, mask,
+                             rays_each(points, sigma_t, ChordFinder::kMost, ChordFinder::kFewest));
+    const ScrambledNet net(rays_each(points, sigma_t, kMostAround, kFewestAround));
     const std::size_t around = net.size();
     std::vector<V3f> on_surface;
     if (below.empty()) {
@@ -150,14 +148,14 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
-        const std::vector<Chord> all_chords = finder.find(points, which, kSeed);
+        const std::vector<Chord> all_chords = finder.find(points, which, begin, kSeed);
         const std::vector<float> all_ways = ways_around(below, which, begin, net, finder);
         const std::vector<OnceScattered> all_places =
             thin.traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
                                : std::vector<OnceScattered>(all_chords.size());
         for (std::size_t at = 0; at < which.size(); ++at) {
-            const std::span chords = std::span(all_chords).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
-            const std::span places = std::span(all_places).subspan(at * ChordFinder::kChords, ChordFinder::kChords);
+            const std::span chords = std::span(all_chords).subspan(at * finder.chords(), finder.chords());
+            const std::span places = std::span(all_places).subspan(at * finder.chords(), finder.chords());
             const std::span ways = std::span(all_ways).subspan(at * around, around);
             const std::size_t k = which[at];
             if (!finder.is_closed(chords)) continue;
