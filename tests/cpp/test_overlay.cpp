@@ -274,6 +274,30 @@ TEST_CASE("each fracture plane along a ray stops it by the chance of its mask an
     }
 }
 
+TEST_CASE("fine and faint fracture planes stop a ray wherever they are along it") {
+    Pattern pattern = pattern_of(PatternKind::fracture);
+    pattern.size = 0.02f;
+    pattern.warp = 0.0f;
+    pattern.width = 0.002f;
+    pattern.amount = 1.0f;
+    constexpr float kOpacity = 0.02f;
+    const FractureRay ray{V3f(0.1f, 0.2f, 0.3f), V3f(0.3f, -0.6f, 0.7f).normalized(), 1e-3f, 3.0f};
+    Sampler any(1, 0, 0);
+    float t = 0.0f;
+    V3f normal;
+    int planes = 0;
+    for (FractureRay rest = ray; find_fracture(pattern, 1.0f, rest, any, t, normal); rest.t_min = t + 1e-5f) ++planes;
+    CHECK(planes > 50);
+    constexpr int kDraws = 4096;
+    int stopped = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+        Sampler coins(7, 0, std::uint32_t(draw));
+        stopped += find_fracture(pattern, kOpacity, ray, coins, t, normal) ? 1 : 0;
+    }
+    CAPTURE(planes);
+    CHECK(stopped / double(kDraws) == doctest::Approx(1.0 - std::pow(1.0 - double(kOpacity), planes)).epsilon(0.02));
+}
+
 TEST_CASE("overlays out of range are refused by name") {
     Scene scene = scene_of(sphere(1.0f, 1), ice(Rgb(0.1f), 1.31f, 0.3f, CompensationMode::ratio));
     IceMaterial& model = std::get<IceMaterial>(scene.materials[0].model);

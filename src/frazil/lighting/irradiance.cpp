@@ -245,8 +245,10 @@ Irradiance bake_irradiance(const PointSet& points, const RayScene& scene, const 
     std::atomic<std::size_t> done{0};
     parallel_for(points.size(), chunk, [&](std::size_t begin, std::size_t end) {
         std::vector<Served> served(end - begin);
-        for (std::size_t i = begin; i < end; ++i)
-            served[i - begin].point = order[i], served[i - begin].work.part = std::uint32_t(i);
+        for (std::size_t i = begin; i < end; ++i) {
+            served[i - begin].point = order[i];
+            served[i - begin].work.part = std::uint32_t(i);
+        }
         Batch batch;
         bake.serve(served, batch);
         rays += batch.traced;
@@ -266,7 +268,6 @@ std::vector<Ray> shadow_rays(const PointSet& points, const LightSampler& lights,
     std::vector<Ray> rays;
     BakeRays work;
     const std::vector<BakeTask> tasks = bake_tasks(lights, light_groups(lights.lights()), options.component);
-    work.part = 0;
     for (const std::uint32_t point : morton_order(points.positions)) {
         maker.find_places(point, work);
         for (const BakeTask& task : tasks) {

@@ -14,7 +14,7 @@ constexpr int kPlaneFamilies = 4;
 constexpr float kMostNoise = 1.5f;
 constexpr float kMostOffset = 0.7f;  // of a plane, in pitches
 constexpr int kMostPlanes = 6;       // of a family that are looked at one by one
-constexpr int kMostPlanesMet = 16;   // along a ray, of all families
+constexpr int kMostPlanesMet = 256;  // along a ray, of all families
 // Lines at a flat angle to the surface are widened no further than this.
 constexpr float kLeastSine = 0.25f;
 // Area of the walls between cells of unit size in a unit of volume, measured.

@@ -133,6 +133,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     // Of light that is scattered once in an index-matched half space, from all around [Chandrasekhar1960].
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
     Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
+    if (medium.sigma_a == Rgb(0.0f)) return result;
     const float sigma_t = densest(medium);
     const ChordFinder finder(scene, shells, mask,
                              rays_each(points, sigma_t, ChordFinder::kMost, ChordFinder::kFewest));
