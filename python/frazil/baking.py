@@ -34,7 +34,7 @@ from .warning import FrazilWarning
 __all__ = ["Bake", "bake", "load_bake", "refresh_bake", "save_bake"]
 
 _FORMAT = "frazil bake"
-_VERSION = 5
+_VERSION = 6
 # What a bake depends on; other options of a render leave it as it is.
 BAKE_OPTIONS = (
     "seed",
@@ -77,7 +77,7 @@ def bake(
     threads: int = 0,
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
-    bake_samples: int = 32,
+    bake_samples: int = 0,
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,

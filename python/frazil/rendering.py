@@ -52,7 +52,7 @@ def render(
     spacing: float = 0.0,
     spacing_scale: float = 1.0,
     spacing_pixels: float = 0.0,
-    bake_samples: int = 32,
+    bake_samples: int = 0,
     bake_error: float = 0.0,
     translucent_shadows: bool = False,
     bake_bounces: int = 4,
@@ -102,8 +102,9 @@ def render(
     spacing_pixels : float
         Points are no nearer to each other than so many pixels of the camera, so that far ice takes fewer; 0 = off.
     bake_samples : int
-        Shadow rays per point and light, 1 or more; half as many look for bounced light, twice as many for
-        `occlusion`.
+        Shadow rays per point and light; half as many look for bounced light, twice as many for `occlusion`. 0 = 32
+        where points are half a mean free path apart or more, and where they are closer as many to the same area, 8 at
+        least: neighbours share what their rays tell.
     bake_error : float
         Relative error at each point to which the bake takes more samples, >= 0; 0 = none.
     translucent_shadows : bool

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "frazil/base/quadrature.h"
+#include "frazil/render/rays_each.h"
 #include "frazil/render/thickness.h"
 #include "frazil/translucency/half_space.h"
 #include "shapes.h"
@@ -47,6 +48,39 @@ Rgb mean_gain(const Mesh& mesh, const Medium& medium, float traced = 0.0f, float
 }
 
 }  // namespace
+
+TEST_CASE("rays each: as many to an area however close the points, a power of two") {
+    PointSet points;
+    CHECK(rays_each(points, 1.0f, 64, 4) == 64);  // of points without a spacing
+    for (const auto& [spacing, rays] :
+         {std::pair(0.8f, 64), {0.5f, 64}, {0.25f, 16}, {0.2f, 16}, {0.1f, 4}, {0.01f, 4}}) {
+        points.spacing = 0.02f * spacing;
+        CHECK(rays_each(points, 0.02f, 64, 4) == rays);
+    }
+}
+
+TEST_CASE("thickness: points that share their chords gain as much as points by themselves") {
+    const Mesh mesh = slab(0.1f);
+    const RayScene scene({mesh}, {Placement{}});
+    const Medium medium{Rgb(10.0f, 20.0f, 30.0f), Rgb(3.0f, 1.0f, 0.5f), 1.31f};
+    const ThinMedium thin = ThinMedium::of(medium, 0.0f);
+    PointSet alone = middle(), close = middle();
+    close.spacing = 0.001f;
+    for (const float seen_through : {0.0f, 1.0f}) {
+        Rgb gain[2] = {Rgb(0.0f), Rgb(0.0f)}, exponent[2] = {Rgb(0.0f), Rgb(0.0f)};
+        for (int i = 0; i < 2; ++i) {
+            const Thinness found = thinness(i == 0 ? alone : close, {}, scene, thin, seen_through);
+            for (std::size_t k = 0; k < 64; ++k) {
+                gain[i] += found.gain[k] / 64.0f;
+                exponent[i] += found.exponent[k] / 64.0f;
+            }
+        }
+        for (int c = 0; c < 3; ++c) {
+            CHECK(gain[1][c] == doctest::Approx(gain[0][c]).epsilon(0.02));
+            CHECK(exponent[1][c] == doctest::Approx(exponent[0][c]).epsilon(0.05));
+        }
+    }
+}
 
 TEST_CASE("thickness: a thin slab absorbs sigma_a times its mean chord, twice its thickness") {
     // Absorption at one hundredth, a tenth and all of the chord's worth.

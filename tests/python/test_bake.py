@@ -30,6 +30,18 @@ def test_a_render_with_a_bake_has_the_bits_of_one_without():
         np.testing.assert_array_equal(plain[name], baked[name], err_msg=name)
 
 
+def test_points_that_are_closer_share_their_rays():
+    """32 rays where points are half a mean free path apart, as many to the same area where they are closer."""
+    scene = ice_over_floor()
+    free_path = 2 * fz.bake(scene, bake_samples=1, bake_bounces=0).points(0).spacing
+    for scale, rays in ((1.0, 32), (0.7, 16), (0.5, 8), (0.3, 8)):
+        spacing = 0.5 * scale * free_path
+        default = light(fz.bake(scene, spacing=spacing, bake_bounces=1))
+        np.testing.assert_array_equal(
+            default, light(fz.bake(scene, spacing=spacing, bake_bounces=1, bake_samples=rays))
+        )
+
+
 def test_a_file_gives_back_the_bits_and_serves_another_camera(tmp_path):
     path = tmp_path / "ice.bake"
     first, report = refreshed(ice_over_floor(), path)

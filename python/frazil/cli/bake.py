@@ -42,8 +42,13 @@ def bake_command(
         float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels of the camera.")
     ] = 0.0,
     bake_samples: Annotated[
-        int, typer.Option(metavar="N", help="Shadow rays per point and light; half as many look for bounced light.")
-    ] = 32,
+        int,
+        typer.Option(
+            metavar="N",
+            help="Shadow rays per point and light; half as many look for bounced light. 0 = 32, fewer where points are "
+            "closer than half a mean free path.",
+        ),
+    ] = 0,
     bake_error: Annotated[
         float,
         typer.Option(metavar="ERROR", help="Relative error of a point's light until which it gets more rays. 0 = off."),
@@ -78,7 +83,7 @@ def bake_command(
     size = None if resolution is None else checked_resolution(resolution)
     within("--threads", threads, 0, 4096)
     within("--seed", seed, 0, 2**32 - 1)
-    within("--bake-samples", bake_samples, 1, 2**20)
+    within("--bake-samples", bake_samples, 0, 2**20)
     within("--bake-bounces", bake_bounces, 0, 64)
     if output.suffix.lower() in (".exr", ".png"):
         raise misused("-o", f"must not be a picture's name, got '{output}'. As in ice.bake.")

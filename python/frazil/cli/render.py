@@ -86,8 +86,13 @@ def render_command(
         float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels, so that far ice takes fewer.")
     ] = 0.0,
     bake_samples: Annotated[
-        int, typer.Option(metavar="N", help="Shadow rays per point and light; half as many look for bounced light.")
-    ] = 32,
+        int,
+        typer.Option(
+            metavar="N",
+            help="Shadow rays per point and light; half as many look for bounced light. 0 = 32, fewer where points are "
+            "closer than half a mean free path.",
+        ),
+    ] = 0,
     bake_error: Annotated[
         float,
         typer.Option(metavar="ERROR", help="Relative error of a point's light until which it gets more rays. 0 = off."),
@@ -165,7 +170,7 @@ def render_command(
     within("--threads", threads, 0, 4096)
     within("--seed", seed, 0, 2**32 - 1)
     within("--max-bounces", max_bounces, 0, 1024)
-    within("--bake-samples", bake_samples, 1, 2**20)
+    within("--bake-samples", bake_samples, 0, 2**20)
     within("--bake-bounces", bake_bounces, 0, 64)
     layers = _chosen_layers(aov)
     expressions = _named("--lpe", lpe, "EXPRESSION")

@@ -13,6 +13,7 @@
 #include "frazil/points/sampled_spacing.h"
 #include "frazil/render/bounces.h"
 #include "frazil/render/drift.h"
+#include "frazil/render/rays_each.h"
 #include "frazil/render/stopwatch.h"
 
 namespace frazil {
@@ -225,18 +226,19 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         if (lit[i].points.size() == 0) continue;
         Stopwatch watch(stats.seconds["bake"]);
         const IceMaterial& material = *bodies[i]->material;
-        IrradianceOptions bake_options{options.bake_samples, options.seed};
+        const PointSet in_world = lit[i].points.in_world();
+        const int samples = bake_samples_each(in_world, bodies[i]->mean_free_path(), options);
+        IrradianceOptions bake_options{samples, options.seed};
         bake_options.objects = {static_cast<std::uint32_t>(i)};
         bake_options.error = options.bake_error;
         bake_options.with_flows = true;
-        const PointSet in_world = lit[i].points.in_world();
         Mesh mesh;
         std::shared_ptr<const Cells> cells;
         if (options.gather.estimator == Estimator::noise_free) {
             PointCloud& cloud = lit[i].points.cloud();
             // No more than shadow rays; fewer where points are so many that their cells are small.
             const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), kFewestPlaces,
-                                          std::clamp(options.bake_samples, 8, 256));
+                                          std::clamp(samples, 8, 256));
             cloud.add_cells(true, [&](const PointSet& points) {
                 return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), places);
             });

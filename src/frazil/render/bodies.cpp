@@ -7,6 +7,7 @@
 
 #include "frazil/render/drift.h"
 #include "frazil/render/interior.h"
+#include "frazil/render/rays_each.h"
 #include "frazil/render/stopwatch.h"
 #include "frazil/render/thickness.h"
 #include "frazil/render/translucency_sets.h"
@@ -157,7 +158,8 @@ void add_room(std::size_t object, const Body& body, const RayScene& scene, const
     points.cloud().add_room(body.sigma_t(), body.depth(), [&] {
         std::vector<std::uint8_t> itself(object + 1, 0);
         itself[object] = 1;
-        const int chords = rays_each(points.in_world(), body.sigma_t(), ChordFinder::kMost, ChordFinder::kFewest);
+        const int chords =
+            rays_each(points.in_world(), body.mean_free_path(), ChordFinder::kMost, ChordFinder::kFewest);
         return room_of(points.in_world(), ChordFinder(scene, shells, &itself, chords), body.sigma_t());
     });
 }

@@ -7,6 +7,7 @@
 #include "frazil/base/parallel.h"
 #include "frazil/lighting/bounce.h"
 #include "frazil/points/point_lookup.h"
+#include "frazil/render/rays_each.h"
 #include "frazil/render/stopwatch.h"
 #include "frazil/render/translucency_sets.h"
 
@@ -211,8 +212,7 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     if (points == 0) return;
 
     // What each point sees: ice, along lines that all bounces take, and what straight light makes of other surfaces.
-    const std::size_t wanted = static_cast<std::size_t>(std::max(1, options.bake_samples / 2));
-    const int rays = static_cast<int>(std::clamp<std::size_t>(kMostSightlines / points, 1, wanted));
+    const int most_rays = static_cast<int>(std::min<std::size_t>(kMostSightlines / points, std::size_t(1) << 20));
     std::vector<std::vector<PointLook>> looks(lit.size());
     std::vector<std::vector<float>> entering(lit.size());
     for (std::size_t i = 0; i < lit.size(); ++i) {
@@ -226,7 +226,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         const PointSet in_world = lit[i].points.in_world();
-        IrradianceOptions bake_options{rays, options.seed};
+        const int half = bake_samples_each(in_world, bodies[i]->mean_free_path(), options) / 2;
+        IrradianceOptions bake_options{std::max(1, std::min(half, most_rays)), options.seed};
         Mesh mesh;
         const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
         if (cells) {

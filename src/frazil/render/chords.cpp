@@ -1,19 +1,11 @@
 #include "frazil/render/chords.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "frazil/base/trigonometry.h"
 
 namespace frazil {
-
-int rays_each(const PointSet& points, float sigma_t, int most, int fewest) {
-    if (!(points.spacing > 0.0f)) return most;
-    const double apart = 2.0 * points.spacing * double(sigma_t);
-    const double many = std::clamp(most * apart * apart, double(fewest), double(most));
-    return static_cast<int>(std::bit_ceil(static_cast<unsigned>(many)));
-}
 
 ChordFinder::ChordFinder(const RayScene& scene, const Shells* shells, PlacementMask mask, int chords)
     : scene_(scene), shells_(shells), mask_(mask), net_(chords) {}
@@ -23,8 +15,8 @@ void ChordFinder::draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& 
     net_.draw(seed, static_cast<std::uint32_t>(point), u);
 }
 
-std::vector<Chord> ChordFinder::find(const PointSet& points, std::span<const std::uint32_t> which,
-                                     std::size_t first, std::uint32_t seed) const {
+std::vector<Chord> ChordFinder::find(const PointSet& points, std::span<const std::uint32_t> which, std::size_t first,
+                                     std::uint32_t seed) const {
     std::vector<Chord> chords;
     std::vector<Ray> rays;
     std::vector<V2f> u(net_.size());

@@ -21,10 +21,6 @@ struct Chord {
     float length = 0.0f;  // infinite where there is no other side
 };
 
-// How many rays each point sends where so many in all, `most`, go to a square of half a free path, which they tell of together:
-// a power of two. `most` where the points' spacing is not known.
-int rays_each(const PointSet& points, float sigma_t, int most, int fewest);
-
 class ChordFinder {
   public:
     static constexpr int kMost = 16, kFewest = 4;  // chords from each point

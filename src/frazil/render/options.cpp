@@ -16,7 +16,7 @@ void check_options(const RenderOptions& options) {
     require(options.shading_samples >= 0, "shading_samples must be >= 0", options.shading_samples);
     require(std::isfinite(options.noise) && options.noise >= 0.0f, "noise must be >= 0", options.noise);
     require(options.min_samples >= 1, "min_samples must be >= 1", options.min_samples);
-    require(options.bake_samples >= 1, "bake_samples must be >= 1", options.bake_samples);
+    require(options.bake_samples >= 0, "bake_samples must be >= 0", options.bake_samples);
     require(std::isfinite(options.bake_error) && options.bake_error >= 0.0f, "bake_error must be >= 0",
             options.bake_error);
     require(options.bake_bounces >= 0, "bake_bounces must be >= 0", options.bake_bounces);

@@ -114,6 +114,7 @@ std::shared_ptr<const PointLookup> PointCloud::lookup() {
 PointSet PlacedPoints::in_world() const {
     if (!cloud_) return {};
     PointSet result = cloud_->points();
+    if (to_world_ == M44f()) return result;  // to the bit: normals made anew may differ in their last one
     for (V3f& position : result.positions) position = position * to_world_;
     for (V3f& normal : result.normals) normal = transform_normal(normal, to_cloud_);
     return result;

@@ -291,7 +291,8 @@ RenderResult render_in_arena(const Scene& scene, const RenderOptions& options, P
                     stats);
         if (layout.has("occlusion") || layout.has("bent_normal")) {
             Stopwatch watch(stats.seconds["occlusion"]);
-            const int rays = std::min(kOpennessRays * options.bake_samples, kMostOpennessRays);
+            const int at_a_point = options.bake_samples > 0 ? options.bake_samples : kBakeSamples;
+            const int rays = std::min(kOpennessRays * at_a_point, kMostOpennessRays);
             openness.emplace(lit, ray_scene, rays, options.seed);
         }
     };

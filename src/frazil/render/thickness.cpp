@@ -9,6 +9,7 @@
 #include "frazil/base/trigonometry.h"
 #include "frazil/render/chords.h"
 #include "frazil/render/drift.h"
+#include "frazil/render/rays_each.h"
 #include "frazil/translucency/fresnel.h"
 #include "frazil/translucency/half_space.h"
 
@@ -72,11 +73,6 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
 // Rays all around from the place below each point.
 constexpr int kMostAround = 64, kFewestAround = 4;
 
-float densest(const Medium& medium) {
-    const Rgb sigma_t = medium.sigma_s_prime + medium.sigma_a;
-    return std::max({sigma_t.x, sigma_t.y, sigma_t.z});
-}
-
 // `first` is the number of which[0] among all points.
 std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which, std::size_t first,
                                const ScrambledNet& net, const ChordFinder& finder) {
@@ -134,10 +130,10 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
     Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
     if (medium.sigma_a == Rgb(0.0f)) return result;
-    const float sigma_t = densest(medium);
+    const float free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     const ChordFinder finder(scene, shells, mask,
-                             rays_each(points, sigma_t, ChordFinder::kMost, ChordFinder::kFewest));
-    const ScrambledNet net(rays_each(points, sigma_t, kMostAround, kFewestAround));
+                             rays_each(points, free_path, ChordFinder::kMost, ChordFinder::kFewest));
+    const ScrambledNet net(rays_each(points, free_path, kMostAround, kFewestAround));
     const std::size_t around = net.size();
     std::vector<V3f> on_surface;
     if (below.empty()) {
