@@ -60,7 +60,7 @@ TEST_CASE("inner gathers: between the nodes as right there, within a percent") {
     const InnerGathers inside(*ball.bodies[0], 2, ball.options);
     const std::vector<V3f> places = places_inside();
     const CoreSums rows = interpolated(inside, places);
-    const CoreSums there = gather_core(ball.bodies[0]->trees, places, places, ball.options);
+    const CoreSums there = gather_core(ball.bodies[0]->trees, {places, places}, ball.options);
     const SumColumns& columns = there.columns();
     REQUIRE(rows.columns().count() == columns.count());
     REQUIRE((columns.has_surface && columns.has_thin && columns.groups == 2 && columns.knots == 3));

@@ -183,6 +183,23 @@ TEST_CASE("thickness: what is seen straight through is not the core's, which kee
     }
 }
 
+TEST_CASE(
+    "thickness: the exponent of a slab is what its other side has there, and changes with the depth as that does") {
+    const float depths = 2.0f;  // free paths
+    const Medium medium{Rgb(9.43f), Rgb(0.57f), 1.0f};
+    const ThinMedium thin = ThinMedium::of(medium, 0.0f);
+    const RayScene scene({slab(depths / 10.0f)}, {Placement{}});
+    const std::vector<Rgb> exponent = thinness(middle(), {}, scene, thin).exponent;
+    Rgb at_surface(0.0f), slope(0.0f);
+    for (std::size_t k = 0; k < 64; ++k) {
+        at_surface += exponent[2 * k] / 64.0f;
+        slope += exponent[2 * k + 1] / 64.0f;
+    }
+    const EvenLight::Exponent there = thin.even_light[0].half_space(depths);
+    CHECK(at_surface.x == doctest::Approx(there.value).epsilon(0.15));
+    CHECK(slope.x == doctest::Approx(-there.slope).epsilon(0.1));
+}
+
 TEST_CASE("thickness: slabs of ice return what random walks do that its boundary reflects inside") {
     // Walks from outside at cosines inside of 1, 0.8 and 0.66, averaged; alpha 0.99, 0.943 and 0.7; eta 1.31.
     const Medium medium{Rgb(0.99f, 0.943f, 0.7f), Rgb(0.01f, 0.057f, 0.3f), 1.31f};

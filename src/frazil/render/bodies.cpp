@@ -50,13 +50,18 @@ Rgb Body::leaving_share(float cosine) const {
     return Rgb((*by_angle)[0](cosine), (*by_angle)[1](cosine), (*by_angle)[2](cosine)) / (*white_by_angle)(cosine);
 }
 
+Rgb Body::absorbed_at(float cosine) const {
+    Rgb depth;
+    for (int c = 0; c < 3; ++c) depth[c] = thin->even_light[std::size_t(c)].absorbed_at(cosine);
+    return depth;
+}
+
 V3f Body::drift(const V3f& direction, const V3f& normal) const {
     return (direction - normal * direction.dot(normal)) / (medium.eta * sigma_t());
 }
 
 float Body::sigma_t() const {
-    const Rgb extinction = medium.sigma_s_prime + medium.sigma_a;
-    return (extinction.x + extinction.y + extinction.z) / 3.0f;
+    return mean_component(medium.sigma_s_prime + medium.sigma_a);
 }
 
 float Body::mean_free_path() const {
@@ -205,13 +210,17 @@ std::shared_ptr<const Thinness> ThicknessTrees::thinness_of(std::size_t leader) 
         [&] { return make(&itself); });
 }
 
-std::shared_ptr<const PointTree> ThicknessTrees::of(std::size_t leader) {
+std::shared_ptr<const ThinField> ThicknessTrees::of(std::size_t leader) {
     const PlacedPoints& points = sets_.points(leader);
     if (points.size() == 0) return nullptr;
     const Body& body = *bodies_[leader];
-    const auto plant = [&] { return make_tree(points, body.plain_kernel, thinness_of(leader)->exponent, 1); };
+    const auto plant = [&] {
+        const std::shared_ptr<const Thinness> known = thinness_of(leader);
+        return std::make_shared<const ThinField>(points.cloud().points(), known->exponent,
+                                                 make_tree(points, body.plain_kernel, known->exponent, 2), body.thin);
+    };
     if (!is_shared(leader)) return plant();
-    auto& shared = trees_[{&points.cloud(), body.plain_kernel.get()}];
+    auto& shared = fields_[{&points.cloud(), body.plain_kernel.get()}];
     if (!shared) shared = plant();
     return shared;
 }
@@ -280,7 +289,7 @@ TranslucencySets plant_trees(const Scene& scene, const std::vector<LitPoints>& l
         }
         if (is_alone) has_taken(i);
         if (wants_depth || compensation.mode == CompensationMode::depth) {
-            body.trees.thickness = thickness.of(i);
+            body.trees.thin = thickness.of(i);
         }
         stats.points += body.trees.light->point_count();
         stats.nodes += body.trees.light->node_count();

@@ -29,6 +29,9 @@
 
 namespace frazil {
 
+// Of light that leaves, on the mean over angles.
+constexpr float kMeanCosine = 2.0f / 3.0f;
+
 struct Body {
     Body(const IceMaterial* of_material, const Medium& of_medium, std::shared_ptr<const DielectricAlbedo> with_boundary,
          const Profile& with_profile, std::shared_ptr<const TreeKernel> sum,
@@ -75,6 +78,8 @@ struct Body {
     // As it leaves to a camera, over what a white core would send there: rays find that themselves (cross_interior). `cosine`
     // inside, times how far in it comes from on the mean, in free paths.
     Rgb leaving_share(float cosine) const;
+    // How many free paths deep it is on the mean that light is absorbed that would leave there: EvenLight::absorbed_at.
+    Rgb absorbed_at(float cosine) const;
     // The cosine inside of a ray outside.
     float cosine_inside(float cos_theta) const;
     // The tangential part of a free path inside along a `direction` outside.
@@ -129,7 +134,7 @@ class ThicknessTrees {
         : scene_(scene), ray_scene_(ray_scene), bodies_(bodies), sets_(sets) {}
 
     // Of a leader of translucency sets; null where it has no points.
-    std::shared_ptr<const PointTree> of(std::size_t leader);
+    std::shared_ptr<const ThinField> of(std::size_t leader);
     // The gain of each of its points; null where it has none.
     std::shared_ptr<const std::vector<Rgb>> gains_at_points(std::size_t leader);
 
@@ -145,7 +150,7 @@ class ThicknessTrees {
     std::map<std::uint32_t, bool> is_closed_;  // by mesh
     // By what they depend on: points, and a kernel that a material has for itself.
     using Key = std::pair<const PointCloud*, const TreeKernel*>;
-    std::map<Key, std::shared_ptr<const PointTree>> trees_;
+    std::map<Key, std::shared_ptr<const ThinField>> fields_;
 };
 
 // Scale the exitance that was gathered for bounces: by `depth` at full strength, whatever the material asks for where it is

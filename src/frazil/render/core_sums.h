@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "frazil/render/thin_field.h"
 #include "frazil/translucency/point_tree.h"
 
 namespace frazil {
@@ -18,8 +19,15 @@ struct CoreTrees {
     std::shared_ptr<const PointTree> light;  // none where the object has no surface; one for a translucency set
     // The same light on the surface itself, where sums are asked for that are not divided by their coverage.
     std::shared_ptr<const PointTree> on_surface;
-    std::shared_ptr<const PointTree> thickness;  // ThicknessTrees
-    std::shared_ptr<const PointTree> overlays;   // plant_overlay_trees, where such layers are asked for
+    std::shared_ptr<const ThinField> thin;
+    std::shared_ptr<const PointTree> overlays;  // plant_overlay_trees, where such layers are asked for
+};
+
+// Each place where light is scattered first, and on the surface; and where what it lacks is absorbed, nowhere if all of them lie
+// inside.
+struct CorePlaces {
+    std::vector<V3f> below, on_surface;
+    AbsorbingPlaces absorbing = {};
 };
 
 // What a row consists of, in this order. Overlays come last: rows without them are the beginning of those that have some.
@@ -30,7 +38,7 @@ struct SumColumns {
 
     std::size_t of_tree() const { return 1 + groups * (1 + knots); }
     std::size_t thin() const { return has_surface ? 2 * of_tree() : of_tree(); }
-    std::size_t first_overlay() const { return has_thin ? thin() + 1 : thin(); }
+    std::size_t first_overlay() const { return has_thin ? thin() + 2 : thin(); }
     std::size_t count() const { return first_overlay() + overlays; }
 };
 
@@ -63,7 +71,7 @@ class CoreSums {
     TreeSums on_surface(std::size_t i) const {
         return {columns_.has_surface ? row(i) + columns_.of_tree() : row(i), columns_.groups, columns_.knots};
     }
-    // thin_exponents(); null without.
+    // Of ThinField, both; null without.
     const Rgb* thin(std::size_t i) const { return columns_.has_thin ? row(i) + columns_.thin() : nullptr; }
     // (layers, groups); null without.
     const Rgb* overlays(std::size_t i) const {
@@ -76,20 +84,14 @@ class CoreSums {
     void append(const CoreSums& more);
 
   private:
-    friend CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below,
-                                const std::vector<V3f>& on_surface, const GatherOptions& options);
+    friend CoreSums gather_core(const CoreTrees& trees, const CorePlaces& places, const GatherOptions& options);
 
     SumColumns columns_;
     std::vector<Rgb> values_;
 };
 
-// Sums at places, where the trees stand; each as it is where light is scattered first, and on the surface.
-CoreSums gather_core(const CoreTrees& trees, const std::vector<V3f>& below, const std::vector<V3f>& on_surface,
-                     const GatherOptions& options);
-
-// The mean exponent of thin parts around each position, from such a tree; empty without one.
-std::vector<Rgb> thin_exponents(const PointTree* thickness, const V3f* positions, std::size_t count,
-                                const GatherOptions& options);
+// Sums at places, where the trees stand.
+CoreSums gather_core(const CoreTrees& trees, const CorePlaces& places, const GatherOptions& options);
 
 // Add the first `count` columns of a row, weighted, to those of another.
 inline void add_weighted(Rgb* sum, const Rgb* row, std::size_t count, float weight) {

@@ -19,17 +19,8 @@ constexpr float kFaintFill = 0.005f;
 
 constexpr std::uint32_t kNoRow = ~std::uint32_t(0);
 
-std::vector<V3f> moved(std::vector<V3f> positions, const M44f& matrix) {
-    for (V3f& position : positions) position = position * matrix;
-    return positions;
-}
-
-// Each place that requests without a row ask for once, as deep as these tell and on the surface.
-struct Places {
-    std::vector<V3f> below, on_surface;
-};
-
-Places shared_places(std::span<GatherRequest* const> requests, float cell, std::vector<std::uint32_t>& row_of) {
+// Each place that requests without a row ask for once, as deep as these tell.
+CorePlaces shared_places(std::span<GatherRequest* const> requests, float cell, std::vector<std::uint32_t>& row_of) {
     struct Key {
         std::uint64_t hash;
         std::uint32_t request;
@@ -50,17 +41,25 @@ Places shared_places(std::span<GatherRequest* const> requests, float cell, std::
     }
     std::sort(keys.begin(), keys.end(),
               [](const Key& a, const Key& b) { return a.hash != b.hash ? a.hash < b.hash : a.request < b.request; });
-    Places places;
+    CorePlaces places;
     for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
-        V3d sum(0.0), inwards(0.0);
+        V3d sum(0.0), inwards(0.0), absorbing(0.0);
+        V3f normal(0.0f);
+        Rgb depth(0.0f);
         for (end = begin; end < keys.size() && keys[end].hash == keys[begin].hash; ++end) {
             const GatherRequest& request = *requests[keys[end].request];
             sum += V3d(request.position);
             inwards -= V3d(request.normal) * double(request.depth);
+            absorbing += V3d(request.absorbing);
+            normal += request.normal;
+            depth += request.absorbed_at;
             row_of[keys[end].request] = static_cast<std::uint32_t>(places.below.size());
         }
         places.below.emplace_back((sum + inwards) / double(end - begin));
         places.on_surface.emplace_back(sum / double(end - begin));
+        places.absorbing.positions.emplace_back(absorbing / double(end - begin));
+        places.absorbing.normals.push_back(normal.normalized());
+        places.absorbing.depths.push_back(depth / float(end - begin));
     }
     return places;
 }
@@ -74,15 +73,15 @@ struct Scales {
 // on the surface.
 class Exitance {
   public:
-    // `plane` is what of even light a half space sends where it is seen.
-    Exitance(const Body& body, const CoreSums& sums, std::size_t row, const Rgb& plane)
+    // `plane` is what of even light a half space sends where it is seen, the rest is absorbed so many free paths deep.
+    Exitance(const Body& body, const CoreSums& sums, std::size_t row, const Rgb& plane, const Rgb& absorbed_at)
         : body_(body),
           below_(sums.below(row)),
           on_surface_(sums.on_surface(row)),
           has_surface_(sums.columns().has_surface),
           overlays_(sums.overlays(row)) {
         if (const Rgb* exponent = sums.thin(row)) {
-            thin_ = thin_gain(*exponent, plane);
+            thin_ = thin_gain(exponent[0] + exponent[1] * absorbed_at, plane);
             has_thin_ = true;
         }
     }
@@ -163,9 +162,12 @@ Gathering::Answers Gathering::answers_for(const Body& body, Requests requests, c
         row_of[i] = static_cast<std::uint32_t>(blended.size() - 1);
         is_blended.push_back(i);
     }
-    const Places places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
-    CoreSums sums =
-        gather_core(body.trees, moved(places.below, body.to_points), moved(places.on_surface, body.to_points), options);
+    CorePlaces places = shared_places(requests, kCell * std::min(body.spacing, body.mean_free_path()), row_of);
+    for (std::vector<V3f>* kind : {&places.below, &places.on_surface, &places.absorbing.positions}) {
+        for (V3f& position : *kind) position = position * body.to_points;
+    }
+    for (V3f& normal : places.absorbing.normals) body.to_points.multDirMatrix(V3f(normal), normal);
+    CoreSums sums = gather_core(body.trees, places, options);
     sums.append(blended);
     for (const std::uint32_t i : is_blended) row_of[i] += static_cast<std::uint32_t>(places.below.size());
     return {std::move(sums), std::move(row_of), places.below.size()};
@@ -228,7 +230,7 @@ void Gathering::answer(const GatherOptions& options, Tile& tile) const {
 
         for (std::size_t i = begin; i < end; ++i) {
             const GatherRequest& request = *requests[i];
-            const Exitance exitance(body, answers.sums, answers.row_of[i - begin], request.plane);
+            const Exitance exitance(body, answers.sums, answers.row_of[i - begin], request.plane, request.absorbed_at);
             const Scales scales = exitance.scales(body.material->compensation);
             tile.subset = request.subset;
             const Rgb& coverage = exitance.coverage();

@@ -40,7 +40,7 @@ std::shared_ptr<const InnerGathers::Brick> InnerGathers::gather_brick(const Plac
             }
         }
     }
-    return std::make_shared<const Brick>(gather_core(trees_, nodes, nodes, options_));
+    return std::make_shared<const Brick>(gather_core(trees_, {nodes, nodes}, options_));
 }
 
 std::shared_ptr<const InnerGathers::Brick> InnerGathers::brick(const Place& place) const {

@@ -200,6 +200,11 @@ void PathTracer::request_gather(const Path& path, const IceCore& core, const Rgb
     const Rgb leaving = core.slant < 0.0f ? Rgb(1.0f) : body.leaving_share(core.slant * core.within);
     const Rgb scale = core.radiance_per_exitance * leaving * share * body.core_scale;
     request.plane = body.thin->plane * leaving;
+    const float cosine = core.slant < 0.0f ? kMeanCosine : core.slant * core.within;
+    request.absorbed_at = body.absorbed_at(cosine);
+    // Further along the ray than where light is scattered first.
+    const float further = cosine > 0.0f ? mean_component(request.absorbed_at) / cosine : 1.0f;
+    request.absorbing = core.position + (core.drift - core.normal * core.depth) * further;
     Scattering weights = path.weights();
     weights.scale(scale);
     request.diffuse = weights.diffuse;

@@ -20,6 +20,15 @@ GatherOptions PointGatherPlan::options_for(const Body& body) const {
     return options;
 }
 
+AbsorbingPlaces absorbing_below(const Body& body, const PointSet& points) {
+    const Rgb depth = body.absorbed_at(kMeanCosine);
+    AbsorbingPlaces places{points.positions, points.normals, std::vector<Rgb>(points.size(), depth)};
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        places.positions[k] -= points.normals[k] * (mean_component(depth) / body.sigma_t());
+    }
+    return places;
+}
+
 std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const PointCloud& cloud, std::size_t groups,
                                                        PointGatherPlan& plan) {
     const PointSet& points = cloud.points();
@@ -35,12 +44,16 @@ std::shared_ptr<const PointGathers> PointGathers::make(const Body& body, const P
     plan.paths -= double(points.size());
     std::shared_ptr<PointGathers> result(new PointGathers(PointBlend(points, kReach), columns));
     const std::vector<V3f> inwards = cloud.inward_positions();
-    std::vector<V3f> below, on_surface;
+    CorePlaces places;
+    PointSet seen;
     for (const std::uint32_t i : result->blend_.order()) {
-        below.push_back(inwards[i]);
-        on_surface.push_back(points.positions[i]);
+        places.below.push_back(inwards[i]);
+        seen.positions.push_back(points.positions[i]);
+        seen.normals.push_back(points.normals[i]);
     }
-    result->at_points_ = gather_core(trees, below, on_surface, options);
+    places.on_surface = seen.positions;
+    places.absorbing = absorbing_below(body, seen);
+    result->at_points_ = gather_core(trees, places, options);
     return result;
 }
 

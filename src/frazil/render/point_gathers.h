@@ -28,6 +28,9 @@ struct PointGatherPlan {
     GatherOptions options_for(const Body& body) const;
 };
 
+// Where light is absorbed below points, on the mean over angles.
+AbsorbingPlaces absorbing_below(const Body& body, const PointSet& points);
+
 class PointGathers {
   public:
     // Null where the plan has no use for it, or the points' spacing varies. Takes its points and memory off the plan's. The

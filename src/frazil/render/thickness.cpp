@@ -18,6 +18,8 @@ namespace {
 
 // Parts that scatter less of the light have none of it to gain.
 constexpr float kThinnest = 1e-3f;
+// Free paths; from nearer to the surface the slope of what it adds itself is that of a plane, without limit.
+constexpr float kOnSurface = 2e-3f;
 constexpr std::uint32_t kSeed = 0x74686963U;
 
 // Light that is scattered once, at a place on a chord.
@@ -73,16 +75,27 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
 // Rays all around from the place below each point.
 constexpr int kMostAround = 64, kFewestAround = 4;
 
+struct Way {
+    float length;   // to where the body ends, metres
+    float inwards;  // its cosine to the way inwards
+};
+
 // `first` is the number of which[0] among all points.
-std::vector<float> ways_around(std::span<const V3f> places, std::span<const std::uint32_t> which, std::size_t first,
-                               const ScrambledNet& net, const ChordFinder& finder) {
+std::vector<Way> ways_around(const PointSet& points, std::span<const V3f> places, std::span<const std::uint32_t> which,
+                             std::size_t first, const ScrambledNet& net, const ChordFinder& finder) {
     std::vector<Ray> rays;
+    std::vector<Way> ways;
     std::vector<V2f> u(net.size());
     for (const std::uint32_t point : which) {
         net.draw_part(kSeed + 3, static_cast<std::uint32_t>(first++), u);
-        for (const V2f& sample : u) rays.push_back({places[point], uniform_sphere(sample)});
+        for (const V2f& sample : u) {
+            rays.push_back({places[point], uniform_sphere(sample)});
+            ways.push_back({0.0f, -points.normals[point].dot(rays.back().direction)});
+        }
     }
-    return finder.ways_out(rays);
+    const std::vector<float> lengths = finder.ways_out(rays);
+    for (std::size_t i = 0; i < ways.size(); ++i) ways[i].length = lengths[i];
+    return ways;
 }
 
 }  // namespace
@@ -101,6 +114,10 @@ ThinMedium ThinMedium::of(const Medium& medium, float traced) {
         thin.plane[c] = static_cast<float>((albedo.all() - traced * albedo.single) / (1.0 - traced * white));
     }
     return thin;
+}
+
+float ThinMedium::sigma_t() const {
+    return mean_component(medium.sigma_s_prime + medium.sigma_a);
 }
 
 Rgb thin_gain(const Rgb& exponent, const Rgb& plane) {
@@ -128,7 +145,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     }
     // Of light that is scattered once in an index-matched half space, from all around [Chandrasekhar1960].
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
-    Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(points.size(), Rgb(0.0f))};
+    Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(2 * points.size(), Rgb(0.0f))};
     if (medium.sigma_a == Rgb(0.0f)) return result;
     const float free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     const ChordFinder finder(scene, shells, mask,
@@ -146,7 +163,7 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
         const std::span<const std::uint32_t> which = std::span(order).subspan(begin, end - begin);
         const std::vector<Chord> all_chords = finder.find(points, which, begin, kSeed);
-        const std::vector<float> all_ways = ways_around(below, which, begin, net, finder);
+        const std::vector<Way> all_ways = ways_around(points, below, which, begin, net, finder);
         const std::vector<OnceScattered> all_places =
             thin.traced > 0.0f ? scatter_once(all_chords, which, medium.sigma_s_prime, finder)
                                : std::vector<OnceScattered>(all_chords.size());
@@ -161,12 +178,19 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 const float scatter = medium.sigma_s_prime[c], all_of = scatter + medium.sigma_a[c];
                 if (!(medium.sigma_a[c] > 0.0f && scatter > 0.0f)) continue;
                 const EvenLight& light = thin.even_light[std::size_t(c)];
-                float sum = 0.0f;
-                for (const float way : ways) sum += light.along(way * all_of);
-                const float more = sum / float(around) - light.half_space(depth * all_of);
+                const bool is_on_surface = depth * all_of < kOnSurface;
+                float sum = 0.0f, slope = 0.0f;
+                for (const Way& way : ways) {
+                    const EvenLight::Exponent there = light.along(way.length * all_of);
+                    sum += there.value;
+                    if (!is_on_surface || way.inwards > 0.0f) slope += there.slope * way.inwards;
+                }
+                const EvenLight::Exponent plane_there = light.half_space(depth * all_of);
+                slope = slope / float(around) - (is_on_surface ? 0.0f : plane_there.slope);
+                const float at_surface = sum / float(around) - plane_there.value - slope * depth * all_of;
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
-                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f, thick = 0.0f;
+                float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f, thick = 0.0f, deep = 0.0f;
                 // These chords' mean of what a half space sends is what it returns, as the boundary lets it out.
                 for (const Chord& chord : chords) thick += light.returned(chord.cosine);
                 const float out = light.albedo() * static_cast<float>(chords.size()) / thick;
@@ -174,9 +198,12 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                     const float length = chords[i].length * all_of, way = places[i].way;
                     const float straight = std::exp(-length), filled = 1.0f - seen_through * straight;
                     const float scattered = scatter * places[i].metres / matched_once;
-                    const float sent =
-                        std::min(out * light.returned(chords[i].cosine * first_scattering_within(length)), 1.0f);
-                    absorbed += (1.0f - straight) * std::exp(-more) * (1.0f - sent);
+                    const float cosine = chords[i].cosine * first_scattering_within(length);
+                    const float sent = std::min(out * light.returned(cosine), 1.0f);
+                    const float at = light.absorbed_at(cosine);
+                    const float lost = (1.0f - straight) * std::exp(-at_surface - slope * at) * (1.0f - sent);
+                    absorbed += lost;
+                    deep += lost * at;
                     plane += filled * sent;
                     traced_out += 1.0f - filled + once[c] * all_of / scatter * scattered * std::exp(-all_of * way);
                     clear += 1.0f - filled + white_once * scattered * std::exp(-scatter * way);
@@ -187,7 +214,11 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 result.gain[k][c] = core / thin.plane[c];
                 // Against a half space whose chords are as short; all of its light, as far as rays trace none.
                 const float as_short = thin.traced > 0.0f ? thin.plane[c] : plane / (all - clear);
-                if (core < 1.0f && as_short < 1.0f) result.exponent[k][c] = std::log((1.0f - as_short) / (1.0f - core));
+                if (core < 1.0f && as_short < 1.0f) {
+                    const float mean = std::log((1.0f - as_short) / (1.0f - core));
+                    result.exponent[2 * k][c] = absorbed > 0.0f ? mean - slope * deep / absorbed : mean;
+                    result.exponent[2 * k + 1][c] = slope;
+                }
             }
         }
     });

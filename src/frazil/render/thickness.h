@@ -1,7 +1,7 @@
 // How much more light leaves a thin part of a body than the thick plane that profiles assume: its paths are shorter.
 // Model: in even light a place inside scatters J = 1 - exp(-<y>) (translucency/even_light.h), <y> the mean over directions to
 //   where the body ends, by rays from below each point. What that is more than in a half space at the same depth,
-//   Z = <y> - Y(tau), varies slowly; a ray that leaves towards mu is sent 1 - e^{-Z} (1 - r), r what a half space sends there.
+//   Z = <y> - Y(tau), varies slowly; a ray that leaves towards mu is sent 1 - e^{-Z} (1 - r), r what a half space sends there, Z where the rest is absorbed.
 //   Where bodies are seen through, e^{-sigma_t c} of the light goes straight on and is seen as such, c a chord; what is left,
 //   over the 1 - e^{-sigma_t c} of a picture that it fills, is the core's. So is light of one scattering, where rays trace it:
 //   what leaves on either side from a place on each chord, against that of a half space.
@@ -22,6 +22,11 @@
 
 namespace frazil {
 
+// Of the channels.
+inline float mean_component(const Rgb& c) {
+    return (c.x + c.y + c.z) / 3.0f;
+}
+
 // A medium as thin parts know it.
 struct ThinMedium {
     Medium medium;
@@ -29,14 +34,16 @@ struct ThinMedium {
     float traced = 0.0f;                  // of the light of one scattering, how much rays trace
 
     static ThinMedium of(const Medium& medium, float traced);
+    float sigma_t() const;  // 1/m; the mean of the channels
     // What of even light a half space's core returns, less what rays trace, over the part that it fills.
     Rgb plane = Rgb(1.0f);
 };
 
 // Per point.
 struct Thinness {
-    std::vector<Rgb> gain;      // what the core returns over what a half space's does, both less what is traced
-    std::vector<Rgb> exponent;  // Z; below zero where the surface is hollow
+    std::vector<Rgb> gain;  // what the core returns over what a half space's does, both less what is traced
+    // (N, 2): Z at the surface, and what it grows by per free path inwards; below zero where the surface is hollow.
+    std::vector<Rgb> exponent;
 };
 
 // `below` are the places where light is scattered first, one per point, on the mean; the points themselves where it is empty.

@@ -58,6 +58,9 @@ struct GatherRequest {
     V3f position = V3f(0.0f), normal = V3f(0.0f);  // as in IceCore
     float depth = 0.0f;                            // as in IceCore
     Rgb plane = Rgb(1.0f);                         // what of even light a half space's core sends there
+    // Where the rest is absorbed, on the mean: the place, and Body::absorbed_at.
+    V3f absorbing = V3f(0.0f);
+    Rgb absorbed_at = Rgb(0.0f);
     // Radiance per exitance, by the layer that it goes to: the primary ice's is translucency, further light goes the way of
     // its first lobe.
     Rgb translucency = Rgb(0.0f), diffuse = Rgb(0.0f), specular = Rgb(0.0f), refraction = Rgb(0.0f);

@@ -1,0 +1,50 @@
+// What thin parts add to the exponent of what a body absorbs (thickness.h), at places below its surface.
+// Model: a place so deep under the plane of a point's surface has there Z of that point, as deep as it is, and Y of that
+//   depth (even_light.h); what the points about the place where it lies nearest to the surface tell is averaged, over half a
+//   free path or so. Edges that are nearer than the plane at which a ray enters are so known. Deep inside, and where points of
+//   one spacing are too far apart to tell, Z is a sum like that of light.
+// Units: metres, where the body's points stand.
+// Valid: thread-safe after construction.
+// Not: exponents at the points (thickness.h).
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "frazil/points/point_lookup.h"
+#include "frazil/render/thickness.h"
+#include "frazil/translucency/point_tree.h"
+
+namespace frazil {
+
+// Where light is absorbed that would leave towards a viewer.
+struct AbsorbingPlaces {
+    std::vector<V3f> positions;
+    std::vector<V3f> normals;  // outwards, where they are seen
+    std::vector<Rgb> depths;   // free paths below the surface there: EvenLight::absorbed_at
+};
+
+class ThinField {
+  public:
+    // `exponents` (N, 2) as in Thinness; `tree` sums them.
+    ThinField(const PointSet& points, const std::vector<Rgb>& exponents, std::shared_ptr<const PointTree> tree,
+              std::shared_ptr<const ThinMedium> medium);
+
+    // (N, 2), as in Thinness, for places below a surface; `below` are those where their light is summed.
+    std::vector<Rgb> at(const AbsorbingPlaces& places, const std::vector<V3f>& below,
+                        const GatherOptions& options) const;
+    // For places that lie inside.
+    std::vector<Rgb> inside(const std::vector<V3f>& places, const GatherOptions& options) const;
+
+  private:
+    bool near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb* exponents) const;
+
+    std::shared_ptr<const PointTree> tree_;
+    std::shared_ptr<const ThinMedium> medium_;
+    float reach_ = 0.0f;
+    std::optional<PointLookup> lookup_;
+    std::vector<Rgb> exponents_;  // in the order of the lookup
+};
+
+}  // namespace frazil
