@@ -11,7 +11,7 @@ namespace {
 // Thickness varies slowly inside: its gathers may be this much coarser.
 constexpr float kCoarser = 4.0f;
 // How far the mean reaches, at least.
-constexpr float kSpacings = 1.5f, kFreePaths = 1.5f;
+constexpr float kSpacings = 1.5f, kFreePaths = 2.0f;
 
 }  // namespace
 

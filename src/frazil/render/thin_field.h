@@ -1,6 +1,6 @@
 // What thin parts add to the exponent of what a body absorbs (thickness.h), at places below its surface.
 // Model: a place so deep under the plane of a point's surface has there Z of that point, as deep as it is, and Y of that
-//   depth (even_light.h); what the points about the place where it lies nearest to the surface tell is averaged, over half a
+//   depth (even_light.h); what the points about the place where it lies nearest to the surface tell is averaged, over a
 //   free path or so. Edges that are nearer than the plane at which a ray enters are so known. Deep inside, and where points of
 //   one spacing are too far apart to tell, Z is a sum like that of light.
 // Units: metres, where the body's points stand.
