@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "frazil/base/morton_order.h"
 #include "frazil/points/point_blend.h"
 
 namespace frazil {
@@ -12,6 +13,40 @@ namespace {
 constexpr float kCoarser = 4.0f;
 // How far the mean reaches, at least.
 constexpr float kSpacings = 1.5f, kFreePaths = 2.0f;
+// Points nearer to each other than so many free paths tell no more of it together than some of them.
+constexpr float kFewestApart = 0.5f;
+constexpr float kFacesAlike = 0.9f;  // cosine
+
+struct FewPoints {
+    PointSet points;
+    std::vector<Rgb> exponents;
+};
+
+// Of points that follow one another along a curve one stands for those that face as it does, with their mean.
+FewPoints few_points(const PointSet& points, const std::vector<Rgb>& exponents, float apart) {
+    const double closer = double(apart) / points.spacing;
+    const std::size_t run = std::max<std::size_t>(1, static_cast<std::size_t>(closer * closer));
+    const std::vector<std::uint32_t> order = morton_order(points.positions);
+    FewPoints few;
+    for (std::size_t begin = 0; begin < order.size(); begin += run) {
+        const std::size_t end = std::min(begin + run, order.size());
+        const std::uint32_t first = order[begin];
+        Rgb sum[2] = {Rgb(0.0f), Rgb(0.0f)};
+        float count = 0.0f;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i > begin && points.normals[order[i]].dot(points.normals[first]) < kFacesAlike) continue;
+            sum[0] += exponents[2 * order[i]];
+            sum[1] += exponents[2 * order[i] + 1];
+            ++count;
+        }
+        few.points.positions.push_back(points.positions[first]);
+        few.points.normals.push_back(points.normals[first]);
+        few.points.areas.push_back(points.areas[first]);
+        few.exponents.insert(few.exponents.end(), {sum[0] / count, sum[1] / count});
+    }
+    few.points.spacing = std::max(points.spacing, static_cast<decltype(points.spacing)>(apart));
+    return few;
+}
 
 }  // namespace
 
@@ -19,10 +54,12 @@ ThinField::ThinField(const PointSet& points, const std::vector<Rgb>& exponents, 
                      std::shared_ptr<const ThinMedium> medium)
     : tree_(std::move(tree)), medium_(std::move(medium)) {
     if (!PointBlend::suits(points)) return;
-    reach_ = std::max(kSpacings * static_cast<float>(points.spacing), kFreePaths / medium_->sigma_t());
-    lookup_.emplace(points, reach_);
+    const float free_path = 1.0f / medium_->sigma_t();
+    reach_ = std::max(kSpacings * static_cast<float>(points.spacing), kFreePaths * free_path);
+    const FewPoints few = few_points(points, exponents, kFewestApart * free_path);
+    lookup_.emplace(few.points, reach_);
     for (const std::uint32_t i : lookup_->order()) {
-        exponents_.insert(exponents_.end(), {exponents[2 * i], exponents[2 * i + 1]});
+        exponents_.insert(exponents_.end(), {few.exponents[2 * i], few.exponents[2 * i + 1]});
     }
 }
 
@@ -32,7 +69,8 @@ bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb*
     const V3f above = place + normal * own;
     const float scale = 1.0f / (reach_ * reach_);
     float sum = 0.0f, below = 0.0f;  // below the planes of the points, metres
-    Rgb at_surface(0.0f), slope(0.0f);
+    Rgb at_surface(0.0f), slope(0.0f),
+        grown(0.0f);  // grown: from the points' planes to the place, per metre of free paths
     lookup_->visit(above, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
         const V3f way = p - place;
         const float q = 1.0f - (p - above).length2() * scale, under = way.dot(n);
@@ -42,6 +80,7 @@ bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb*
         below += under * weight;
         at_surface += exponents_[2 * point] * weight;
         slope += exponents_[2 * point + 1] * weight;
+        grown += exponents_[2 * point + 1] * (under * weight);
     });
     if (!(sum > 0.0f)) return false;
     const float nearer = mean > 0.0f ? below / (own * sum) : 1.0f;  // than the plane where it is seen
@@ -50,7 +89,8 @@ bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb*
         const float under = depth[c] * nearer;
         const float bent = light.half_space(under).value - light.half_space(depth[c]).value;
         exponents[1][c] = slope[c] / sum;
-        exponents[0][c] = at_surface[c] / sum + exponents[1][c] * (under - depth[c]) + bent;
+        const float growth = own > 0.0f ? grown[c] * depth[c] / own : 0.0f;
+        exponents[0][c] = (at_surface[c] + growth) / sum - exponents[1][c] * depth[c] + bent;
     }
     return true;
 }
