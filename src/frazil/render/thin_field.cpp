@@ -12,7 +12,7 @@ namespace {
 // Thickness varies slowly inside: its gathers may be this much coarser.
 constexpr float kCoarser = 4.0f;
 // How far the mean reaches, at least.
-constexpr float kSpacings = 1.5f, kFreePaths = 2.0f;
+constexpr float kSpacings = 1.5f, kFreePaths = 1.0f;
 // Points nearer to each other than so many free paths tell no more of it together than some of them.
 constexpr float kFewestApart = 0.5f;
 constexpr float kFacesAlike = 0.9f;  // cosine
