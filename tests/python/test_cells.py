@@ -133,13 +133,19 @@ def test_ramp_layers_with_cells():
     np.testing.assert_allclose(total, out.exitance, rtol=2**-11)
 
 
-def test_a_render_takes_a_tenth_of_the_points():
-    """Renders bake over cells: sparse noise-free points are nearer to dense ones than ten times as many plain ones."""
+@pytest.mark.parametrize(("compensation", "off"), [("conserve", 1.0), ("depth", 1.6)])
+def test_a_render_takes_a_tenth_of_the_points(compensation, off):
+    """Renders bake over cells: sparse noise-free points are nearer to dense ones than ten times as many plain ones.
+
+    How thin parts are is known at the points alone: with `depth` sparse ones are a little farther off.
+    """
     shape = blob(4)
     scene = fz.Scene()
     mesh = scene.add_mesh(to_mesh(shape), "/blob")
     medium = fz.Medium(20.0, (0.4, 0.1, 0.03), eta=1.31)
-    scene.add_object("/blob", mesh, scene.add_material("/ice", fz.IceMaterial(medium, specular=0.0)))
+    scene.add_object(
+        "/blob", mesh, scene.add_material("/ice", fz.IceMaterial(medium, specular=0.0, compensation=compensation))
+    )
     # The sun stands at the right of the camera: a shadow's edge runs down the middle.
     turn = trimesh.transformations.rotation_matrix(1.1, (0, 1, 0))
     matrix = np.ascontiguousarray(turn.T)
@@ -160,7 +166,8 @@ def test_a_render_takes_a_tenth_of_the_points():
     plain, sparse = (translucency(*a)[0] for a in ((0.007, "sum", 64), (0.007 * 10**0.5, "noise_free", 640)))
     assert 500 < inside.sum() < 2000
     assert truth[inside].max() > 3 * truth[inside].min()
-    assert rms(sparse[inside], truth[inside]) <= rms(plain[inside], truth[inside])
+    assert rms(sparse[inside], truth[inside]) <= off * rms(plain[inside], truth[inside])
+    assert rms(sparse[inside], truth[inside]) < 0.3  # percent
 
 
 def test_two_places_a_cell_are_as_smooth_as_light_at_the_points():

@@ -11,11 +11,21 @@ namespace {
 
 // Thickness varies slowly inside: its gathers may be this much coarser.
 constexpr float kCoarser = 4.0f;
-// How far the mean reaches, at least.
-constexpr float kSpacings = 1.5f, kFreePaths = 1.0f;
-// Points nearer to each other than so many free paths tell no more of it together than some of them.
-constexpr float kFewestApart = 0.5f;
+// How far the mean reaches, at least; kOfDecay of the length over which light is absorbed, 1/sigma_tr [Jensen2001], as that is
+// how far thickness is felt.
+constexpr float kSpacings = 1.5f, kOfDecay = 0.7f;
+// Points nearer to each other than this part of the reach tell no more of it together than some of them.
+constexpr float kFewestApart = 0.2f;
 constexpr float kFacesAlike = 0.9f;  // cosine
+
+// Of the channel that absorbs most.
+float decay_length(const Medium& medium) {
+    float most = 0.0f;
+    for (int c = 0; c < 3; ++c) {
+        most = std::max(most, 3.0f * medium.sigma_a[c] * (medium.sigma_a[c] + medium.sigma_s_prime[c]));
+    }
+    return most > 0.0f ? 1.0f / std::sqrt(most) : 0.0f;
+}
 
 struct FewPoints {
     PointSet points;
@@ -32,17 +42,23 @@ FewPoints few_points(const PointSet& points, const std::vector<Rgb>& exponents, 
         const std::size_t end = std::min(begin + run, order.size());
         const std::uint32_t first = order[begin];
         Rgb sum[2] = {Rgb(0.0f), Rgb(0.0f)};
-        float count = 0.0f;
+        V3f place(0.0f), normal(0.0f);
+        float area = 0.0f;
         for (std::size_t i = begin; i < end; ++i) {
-            if (i > begin && points.normals[order[i]].dot(points.normals[first]) < kFacesAlike) continue;
-            sum[0] += exponents[2 * order[i]];
-            sum[1] += exponents[2 * order[i] + 1];
-            ++count;
+            const std::uint32_t k = order[i];
+            if (points.normals[k].dot(points.normals[first]) < kFacesAlike) continue;
+            const float own = points.areas[k];
+            sum[0] += exponents[2 * k] * own;
+            sum[1] += exponents[2 * k + 1] * own;
+            place += (points.positions[k] - points.positions[first]) * own;
+            normal += points.normals[k] * own;
+            area += own;
         }
-        few.points.positions.push_back(points.positions[first]);
-        few.points.normals.push_back(points.normals[first]);
-        few.points.areas.push_back(points.areas[first]);
-        few.exponents.insert(few.exponents.end(), {sum[0] / count, sum[1] / count});
+        if (!(area > 0.0f)) continue;
+        few.points.positions.push_back(points.positions[first] + place / area);
+        few.points.normals.push_back(normal.normalized());
+        few.points.areas.push_back(area);
+        few.exponents.insert(few.exponents.end(), {sum[0] / area, sum[1] / area});
     }
     few.points.spacing = std::max(points.spacing, static_cast<decltype(points.spacing)>(apart));
     return few;
@@ -54,12 +70,12 @@ ThinField::ThinField(const PointSet& points, const std::vector<Rgb>& exponents, 
                      std::shared_ptr<const ThinMedium> medium)
     : tree_(std::move(tree)), medium_(std::move(medium)) {
     if (!PointBlend::suits(points)) return;
-    const float free_path = 1.0f / medium_->sigma_t();
-    reach_ = std::max(kSpacings * static_cast<float>(points.spacing), kFreePaths * free_path);
-    const FewPoints few = few_points(points, exponents, kFewestApart * free_path);
+    reach_ = std::max(kSpacings * static_cast<float>(points.spacing), kOfDecay * decay_length(medium_->medium));
+    const FewPoints few = few_points(points, exponents, kFewestApart * reach_);
     lookup_.emplace(few.points, reach_);
     for (const std::uint32_t i : lookup_->order()) {
         exponents_.insert(exponents_.end(), {few.exponents[2 * i], few.exponents[2 * i + 1]});
+        areas_.push_back(few.points.areas[i]);
     }
 }
 
@@ -75,7 +91,7 @@ bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb*
         const V3f way = p - place;
         const float q = 1.0f - (p - above).length2() * scale, under = way.dot(n);
         if (!(q > 0.0f && under > 0.0f)) return;
-        const float weight = q * q * std::exp(-2.0f * scale * (way.length2() - own * own));
+        const float weight = areas_[point] * q * q * std::exp(-2.0f * scale * (way.length2() - own * own));
         sum += weight;
         below += under * weight;
         at_surface += exponents_[2 * point] * weight;

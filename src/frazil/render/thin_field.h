@@ -45,6 +45,7 @@ class ThinField {
     float reach_ = 0.0f;
     std::optional<PointLookup> lookup_;
     std::vector<Rgb> exponents_;  // in the order of the lookup
+    std::vector<float> areas_;    // too
 };
 
 }  // namespace frazil
