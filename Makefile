@@ -122,7 +122,12 @@ sanitize: $(STAMPS)/runtime ## Run the C++ tests under AddressSanitizer and UBSa
 	@cmake -S . -B build/sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1" \
 	    -DFRAZIL_BUILD_TESTS=ON -DFRAZIL_SANITIZE=ON
 	@cmake --build build/sanitize --target frazil_tests
-	@UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 build/sanitize/frazil_tests -tce='$(LONG_CASES)'
+	@# In two processes, half of the cases each: most of them use one core.
+	@export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1; tests="build/sanitize/frazil_tests"; \
+	half=$$(( ($$($$tests -c -tce='$(LONG_CASES)' | grep -o '[0-9]*$$') + 1) / 2 )); \
+	$$tests -tce='$(LONG_CASES)' --last=$$half & first=$$!; failed=0; \
+	$$tests -tce='$(LONG_CASES)' --first=$$((half + 1)) || failed=1; \
+	wait $$first || failed=1; exit $$failed
 
 fuzz: $(STAMPS)/test ## Fuzz every reader: SECONDS=60 for each of them
 	@python tests/fuzz/fuzz.py --seconds $(SECONDS)
