@@ -85,8 +85,8 @@ bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb*
     const V3f above = place + normal * own;
     const float scale = 1.0f / (reach_ * reach_);
     float sum = 0.0f, below = 0.0f;  // below the planes of the points, metres
-    Rgb at_surface(0.0f), slope(0.0f),
-        grown(0.0f);  // grown: from the points' planes to the place, per metre of free paths
+    Rgb at_surface(0.0f), slope(0.0f);
+    Rgb grown(0.0f);  // from the points' planes down to the place: slope times metres
     lookup_->visit(above, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
         const V3f way = p - place;
         const float q = 1.0f - (p - above).length2() * scale, under = way.dot(n);

@@ -1,8 +1,8 @@
 // What thin parts add to the exponent of what a body absorbs (thickness.h), at places below its surface.
 // Model: a place so deep under the plane of a point's surface has there Z of that point, as deep as it is, and Y of that
 //   depth (even_light.h); what the points about the place where it lies nearest to the surface tell is averaged over
-//   their area, as far as absorption is felt. Edges that are nearer than the plane at which a ray enters are so known. Deep inside, and where points of
-//   one spacing are too far apart to tell, Z is a sum like that of light.
+//   their area, as far as absorption is felt. Edges that are nearer than the plane at which a ray enters are so known. Deep
+//   inside, and where the points' spacing varies (PointBlend::suits), Z is a sum like that of light.
 // Units: metres, where the body's points stand.
 // Valid: thread-safe after construction.
 // Not: exponents at the points (thickness.h).

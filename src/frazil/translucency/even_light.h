@@ -4,7 +4,8 @@
 //   <y> = Y(tau) = -ln(1 - J(tau)), from which y(l) = 2 (Y(l) - l Y'(l)) follows, as <y> = 1/2 ∫_1^∞ y(tau s)/s² ds. What is
 //   absorbed, 1 - J, is so a product over directions: sqrt(1 - alpha) at the surface of a half space, its square 1 - alpha
 //   in a body so thin that light is scattered once at most, as it must be. Where the boundary reflects inside, y is so many times as
-//   large that a half space's own J at its surface leaves as little. d<y>/dx is the mean of k(l) w, k = 2 l Y'' - 4 Y', from 1/2 ∫ k(tau s)/s³ ds = -Y'.
+//   large that a half space's own J at its surface leaves as little. d<y>/dx is the mean of k(l) w, k = 2 l Y'' - 4 Y', from
+//   1/2 ∫ k(tau s)/s³ ds = -Y'.
 // Units: optical depths, that is lengths times sigma_s' + sigma_a.
 // Valid: index-matched slabs, spheres and edges within 0.04 of J, albedo 0.3 to 0.99 (tests/cpp/test_even_light.cpp). What
 //   slabs return at eta = 1.31, albedo 0.7 to 0.99, comes within 0.03 of random walks (tests/cpp/test_thickness.cpp).
