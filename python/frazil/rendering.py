@@ -102,7 +102,7 @@ def render(
     spacing_pixels : float
         Points are no nearer to each other than so many pixels of the camera, so that far ice takes fewer; 0 = off.
     bake_samples : int
-        Shadow rays per point and light; half as many look for bounced light, twice as many for `occlusion`. 0 = 32
+        Shadow rays per point and light, and as many that look for bounced light, twice as many for `occlusion`. 0 = 32
         where points are half a mean free path apart or more, and where they are closer as many to the same area, 8 at
         least: neighbours share what their rays tell.
     bake_error : float

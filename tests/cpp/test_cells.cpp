@@ -69,6 +69,27 @@ TEST_CASE("cells: moved along their normals they are those of a smaller sphere, 
     }
 }
 
+TEST_CASE("cells: an ellipse, evenly filled, has the covariance of the cell it stands for") {
+    const V3f normal = V3f(0.3f, 0.9f, -0.2f).normalized(), along = V3f(1.0f, 0.0f, 1.5f).cross(normal).normalized();
+    const V3f across = normal.cross(along);
+    // Of a disc twice as long as wide, askew to the axes that its half axes are told by.
+    const V3f s = along * 0.06f, t = across * 0.03f;
+    Covariance covariance;
+    const int pairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+    for (std::size_t i = 0; i < 6; ++i) {
+        const auto [a, b] = pairs[i];
+        covariance[i] = 0.25f * (s[a] * s[b] + t[a] * t[b]);
+    }
+    const std::array<V3f, 2> axes = ellipse_of(covariance, normal);
+    for (std::size_t i = 0; i < 6; ++i) {
+        const auto [a, b] = pairs[i];
+        CHECK(0.25f * (axes[0][a] * axes[0][b] + axes[1][a] * axes[1][b]) ==
+              doctest::Approx(covariance[i]).epsilon(1e-4));
+    }
+    CHECK(std::abs(axes[0].dot(normal)) < 1e-7f);
+    CHECK(std::abs(axes[1].dot(normal)) < 1e-7f);
+}
+
 TEST_CASE("cells: flat ones move without a change") {
     const Mesh mesh = test::floor_square(1.0f, 0.0f);
     const PointSet points = poisson_points(mesh, 0.2);

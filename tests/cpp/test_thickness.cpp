@@ -212,4 +212,25 @@ TEST_CASE("thickness: slabs of ice return what random walks do that its boundary
     }
 }
 
+TEST_CASE("thickness: of places below points, those that lie outside of a body tell nothing") {
+    // The place below the one point is in the slab, that below the other beyond its other side.
+    const Mesh mesh = test::box_of(V3f(-1.0f, -0.1f, -1.0f), V3f(1.0f, 0.0f, 1.0f));
+    const RayScene scene({mesh}, {Placement{}});
+    const std::vector<std::uint8_t> itself = {1};
+    const Medium medium{Rgb(9.0f), Rgb(1.0f), 1.0f};
+    PointSet points;
+    points.positions = {V3f(0.0f), V3f(0.3f, 0.0f, 0.0f)};
+    points.normals = {V3f(0.0f, 1.0f, 0.0f), V3f(0.0f, 1.0f, 0.0f)};
+    points.areas = {0.01f, 0.01f};
+    points.spacing = 0.1;
+    FirstScattering below{{V3f(0.0f, -0.05f, 0.0f), V3f(0.3f, -0.15f, 0.0f)}, {0.05f, 0.15f}, {}};
+    below.axes.assign(2, {V3f(0.02f, 0.0f, 0.0f), V3f(0.0f, 0.0f, 0.02f)});
+    const Thinness found = thinness(points, below, scene, ThinMedium::of(medium, 0.0f), 0.0f, nullptr, &itself);
+    CHECK(found.known[0] == 1.0f);
+    CHECK(found.exponent[0].x > 0.0f);
+    CHECK(found.known[1] == 0.0f);
+    CHECK(found.exponent[2].x == 0.0f);
+    CHECK(found.gain[1].x == 1.0f);
+}
+
 }  // namespace frazil

@@ -163,8 +163,10 @@ def test_a_render_takes_a_tenth_of_the_points(compensation):
     plain, sparse = (translucency(*a)[0] for a in ((0.007, "sum", 64), (0.007 * 10**0.5, "noise_free", 640)))
     assert 500 < inside.sum() < 2000
     assert truth[inside].max() > 3 * truth[inside].min()
-    assert rms(sparse[inside], truth[inside]) <= rms(plain[inside], truth[inside])
-    assert rms(sparse[inside], truth[inside]) < 0.3  # percent
+    # Thickness is no part of the bake's rays: a tenth of the points asks a tenth of them, but each for all of its cell.
+    as_good = 1.05 if compensation == "depth" else 1.0
+    assert rms(sparse[inside], truth[inside]) <= as_good * rms(plain[inside], truth[inside])
+    assert rms(sparse[inside], truth[inside]) < 0.2  # percent
 
 
 def test_two_places_a_cell_are_as_smooth_as_light_at_the_points():

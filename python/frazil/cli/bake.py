@@ -45,8 +45,8 @@ def bake_command(
         int,
         typer.Option(
             metavar="N",
-            help="Shadow rays per point and light; half as many look for bounced light. 0 = 32, fewer where points are "
-            "closer than half a mean free path.",
+            help="Shadow rays per point and light, and as many that look for bounced light. 0 = 32, fewer where points "
+            "are closer than half a mean free path.",
         ),
     ] = 0,
     bake_error: Annotated[

@@ -34,6 +34,9 @@ inline bool is_finite(const V3f& v) {
 inline float max_component(const V3f& v) {
     return std::max(v.x, std::max(v.y, v.z));
 }
+inline float mean_component(const V3f& v) {
+    return (v.x + v.y + v.z) / 3.0f;
+}
 inline float luminance(const Rgb& c) {
     return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z;
 }

@@ -146,6 +146,12 @@ void keep_first(std::vector<RankedPlace>& places, std::size_t most) {
     places.resize(kept);
 }
 
+// a C b.
+float within(const Covariance& c, const V3f& a, const V3f& b) {
+    return a.dot(V3f(c[0] * b.x + c[3] * b.y + c[4] * b.z, c[3] * b.x + c[1] * b.y + c[5] * b.z,
+                     c[4] * b.x + c[5] * b.y + c[2] * b.z));
+}
+
 // Whether so many points, each of which covers a disc of this radius at most, may cover the mesh: else its pieces could be
 // any number.
 bool can_be_covered(const Mesh& mesh, std::size_t points, double radius) {
@@ -360,13 +366,18 @@ Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places, std::u
     return cells;
 }
 
+std::array<V3f, 2> ellipse_of(const Covariance& covariance, const V3f& normal) {
+    const auto [s, t] = tangent_frame(normal);
+    const float xx = within(covariance, s, s), xy = within(covariance, s, t), yy = within(covariance, t, t);
+    if (!(xx > 0.0f)) return {V3f(0.0f), t * (2.0f * std::sqrt(std::max(0.0f, yy)))};
+    // Its Cholesky factor; a disc of radius 1 has the variance 1/4.
+    const float root = std::sqrt(xx), across = std::sqrt(std::max(0.0f, yy - xy * xy / xx));
+    return {s * (2.0f * root) + t * (2.0f * xy / root), t * (2.0f * across)};
+}
+
 CellBend::CellBend(const CellNormals& normals, const Covariance& covariance, float distance) {
     if (!(normals.mean.length2() > 0.0f)) return;
     const auto [s, t] = tangent_frame(normals.mean.normalized());
-    const auto within = [](const Covariance& c, const V3f& a, const V3f& b) {
-        return a.dot(V3f(c[0] * b.x + c[3] * b.y + c[4] * b.z, c[3] * b.x + c[1] * b.y + c[5] * b.z,
-                         c[4] * b.x + c[5] * b.y + c[2] * b.z));
-    };
     const float xx = within(covariance, s, s), xy = within(covariance, s, t), yy = within(covariance, t, t);
     const float determinant = xx * yy - xy * xy;
     if (!(determinant > kThinnest * (xx + yy) * (xx + yy))) return;

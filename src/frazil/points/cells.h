@@ -53,6 +53,9 @@ struct Cells {
 // ValueError where points and mesh do not belong together.
 Cells cells_of(const PointSet& points, const Mesh& mesh, int most_places = 64, std::uint32_t seed = 0);
 
+// The half axes of an ellipse in a plane that has, evenly filled, a cell's covariance there.
+std::array<V3f, 2> ellipse_of(const Covariance& covariance, const V3f& normal);
+
 // How vectors along a cell change where all of it moves by `distance` along its normals: a linear map of its plane, by the
 // regression of normals on places.
 class CellBend {

@@ -61,7 +61,7 @@ V3f Body::drift(const V3f& direction, const V3f& normal) const {
 }
 
 float Body::sigma_t() const {
-    return mean_component(medium.sigma_s_prime + medium.sigma_a);
+    return mean_sigma_t(medium);
 }
 
 float Body::mean_free_path() const {
@@ -200,7 +200,7 @@ std::shared_ptr<const Thinness> ThicknessTrees::thinness_of(std::size_t leader) 
     std::vector<std::uint8_t> itself(leader + 1, 0);
     itself[leader] = 1;
     const auto make = [&](PlacementMask mask) {
-        return thinness(points.in_world(), points.inward_in_world(), ray_scene_, *body.thin, seen_through,
+        return thinness(points.in_world(), points.first_scattering_in_world(), ray_scene_, *body.thin, seen_through,
                         sets_.shells(leader), mask);
     };
     if (!is_shared(leader)) return std::make_shared<const Thinness>(make(nullptr));
@@ -216,7 +216,7 @@ std::shared_ptr<const ThinField> ThicknessTrees::of(std::size_t leader) {
     const Body& body = *bodies_[leader];
     const auto plant = [&] {
         const std::shared_ptr<const Thinness> known = thinness_of(leader);
-        return std::make_shared<const ThinField>(points.cloud().points(), known->exponent,
+        return std::make_shared<const ThinField>(points.cloud().points(), points.cloud().cells().get(), *known,
                                                  make_tree(points, body.plain_kernel, known->exponent, 2), body.thin);
     };
     if (!is_shared(leader)) return plant();

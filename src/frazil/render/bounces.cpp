@@ -226,8 +226,8 @@ void add_bounces(const Scene& scene, const RayScene& ray_scene, const LightSampl
     for (std::size_t i = 0; i < lit.size(); ++i) {
         if (lit[i].points.size() == 0) continue;
         const PointSet in_world = lit[i].points.in_world();
-        const int half = bake_samples_each(in_world, bodies[i]->mean_free_path(), options) / 2;
-        IrradianceOptions bake_options{std::max(1, std::min(half, most_rays)), options.seed};
+        const int rays = bake_samples_each(in_world, bodies[i]->mean_free_path(), options);
+        IrradianceOptions bake_options{std::max(1, std::min(rays, most_rays)), options.seed};
         Mesh mesh;
         const std::shared_ptr<const Cells> cells = lit[i].points.cloud().cells();
         if (cells) {

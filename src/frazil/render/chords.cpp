@@ -52,4 +52,25 @@ std::vector<float> ChordFinder::ways_out(std::span<const Ray> rays) const {
     return ways;
 }
 
+std::vector<float> ChordFinder::ways_out_if_inside(std::span<const Ray> rays) const {
+    std::vector<float> ways;
+    if (shells_) {
+        for (const Ray& ray : rays) {
+            bool begins_outside = false;
+            const float way = shells_->way_through(ray, &begins_outside);
+            ways.push_back(begins_outside || std::isinf(way) ? kOutside : way);
+        }
+        return ways;
+    }
+    std::vector<Hit> hits(rays.size());
+    scene_.intersect(rays, hits, mask_);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Hit& hit = hits[i];
+        // What is met from before it may be another body where none is masked.
+        const bool is_front = mask_ && rays[i].direction.dot(hit.geometric_normal) < 0.0f;
+        ways.push_back(std::isinf(hit.t) || is_front ? kOutside : hit.t);
+    }
+    return ways;
+}
+
 }  // namespace frazil

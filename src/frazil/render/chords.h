@@ -39,6 +39,9 @@ class ChordFinder {
     bool is_closed(std::span<const Chord> chords) const;
     // How far it is along rays from inside to where the body ends; infinite where it does not.
     std::vector<float> ways_out(std::span<const Ray> rays) const;
+    // The same along rays that may begin outside, as far as what they meet, or that they meet nothing, tells so: kOutside.
+    static constexpr float kOutside = -1.0f;
+    std::vector<float> ways_out_if_inside(std::span<const Ray> rays) const;
     // Quasi-random numbers, one per chord, of which points' are independent.
     void draw(std::uint32_t seed, std::size_t point, std::vector<V2f>& u) const;
 

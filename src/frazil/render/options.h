@@ -29,8 +29,8 @@ struct RenderOptions {
     float spacing_scale = 1.0f;  // multiplies every spacing
     // No finer than so many pixels where a surface is: coarse points far from the camera. 0 = off.
     float spacing_pixels = 0.0f;
-    // Shadow rays per point and light; half as many look for bounced light. 0 = kBakeSamples, fewer where
-    // points are closer (rays_each.h).
+    // Shadow rays per point and light, and as many that look for bounced light. 0 = kBakeSamples, fewer where points
+    // are closer (rays_each.h).
     int bake_samples = 0;
     float bake_error = 0.0f;  // relative error at each point to which the bake takes more samples; 0 = none
     // Shadow rays of the bake go on through ice, dimmed. Off: light that enters ice is counted as diffused there, and what

@@ -100,6 +100,20 @@ void PointCloud::move_inwards(std::vector<V3f>& moments, std::size_t groups) con
     });
 }
 
+FirstScattering PointCloud::first_scattering() const {
+    FirstScattering result{inward_positions(), {}, {}};
+    const std::lock_guard lock(mutex_);
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        result.depths.push_back(room_.inwards.empty() ? 0.0f : depth_ * room_.inwards[k]);
+        if (!cells_) continue;
+        Covariance covariance = cells_->covariances[k];
+        result.centers[k] = cells_->centroids[k];
+        move_along_normals(-result.depths[k], cells_->normals[k], result.centers[k], covariance);
+        result.axes.push_back(ellipse_of(covariance, points_.normals[k]));
+    }
+    return result;
+}
+
 std::vector<float> PointCloud::room_along() const {
     const std::lock_guard lock(mutex_);
     return room_.along;
@@ -120,10 +134,13 @@ PointSet PlacedPoints::in_world() const {
     return result;
 }
 
-std::vector<V3f> PlacedPoints::inward_in_world() const {
+FirstScattering PlacedPoints::first_scattering_in_world() const {
     if (!cloud_) return {};
-    std::vector<V3f> result = cloud_->inward_positions();
-    for (V3f& position : result) position = position * to_world_;
+    FirstScattering result = cloud_->first_scattering();
+    for (V3f& center : result.centers) center = center * to_world_;
+    for (std::array<V3f, 2>& axes : result.axes) {
+        for (V3f& axis : axes) to_world_.multDirMatrix(V3f(axis), axis);
+    }
     return result;
 }
 

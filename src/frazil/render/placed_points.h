@@ -37,6 +37,8 @@ class PointCloud {
     void add_room(float sigma_t, float depth, const std::function<Room()>& make);
     // Where light is scattered first, on the mean: what its clusters are made of, and exitance is summed at.
     std::vector<V3f> inward_positions() const;
+    // The same of all that points stand for.
+    FirstScattering first_scattering() const;
     std::vector<float> room_along() const;
     // Moments of light in cells, (N, groups), from the surface to there.
     void move_inwards(std::vector<V3f>& moments, std::size_t groups) const;
@@ -79,8 +81,8 @@ class PlacedPoints {
     double spacing() const { return cloud_ ? cloud_->points().spacing : 0.0; }
 
     PointSet in_world() const;
-    // PointCloud::inward_positions() in the world.
-    std::vector<V3f> inward_in_world() const;
+    // PointCloud::first_scattering() in the world.
+    FirstScattering first_scattering_in_world() const;
     // Moved into the world; places stay as they are.
     Cells cells_in_world() const;
     // Vectors of the world, such as moments of light, in the frame of the cloud.

@@ -27,7 +27,7 @@ bool Shells::contains(const V3f& position, std::size_t except, std::size_t befor
     return false;
 }
 
-float Shells::way_through(Ray ray) const {
+float Shells::way_through(Ray ray, bool* begins_outside) const {
     float length = 0.0f;
     for (int crossings = 0; crossings < kMostCrossings; ++crossings) {
         Hit hit;
@@ -35,6 +35,7 @@ float Shells::way_through(Ray ray) const {
         length += hit.t;
         if (!has(hit.placement)) return length;
         const float along = ray.direction.dot(hit.geometric_normal);
+        if (begins_outside && crossings == 0) *begins_outside = along < 0.0f && !contains(ray.origin);
         const V3f onward = along > 0.0f ? hit.geometric_normal : -hit.geometric_normal;
         ray.origin = offset_origin(ray.origin + ray.direction * hit.t, onward);
         if (!contains(ray.origin)) return length;

@@ -28,8 +28,8 @@ class Shells {
     // Whether the place is inside a shell of an object below `before`, other than `except`.
     bool contains(const V3f& position, std::size_t except = kAll, std::size_t before = kAll) const;
     // The way along a ray that begins inside to where the last shell is left, or something else met; infinite where
-    // neither is.
-    float way_through(Ray ray) const;
+    // neither is. `begins_outside` tells where it does, if it meets a shell from there.
+    float way_through(Ray ray, bool* begins_outside = nullptr) const;
 
   private:
     struct Shell {

@@ -1,6 +1,7 @@
 #include "frazil/render/thickness.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "frazil/base/morton_order.h"
@@ -72,28 +73,52 @@ std::vector<OnceScattered> scatter_once(std::span<const Chord> chords, std::span
     return places;
 }
 
-// Rays all around from the place below each point.
-constexpr int kMostAround = 64, kFewestAround = 4;
+// Rays all around from below each point, where half of the light is absorbed that enters a half space; an error of what is
+// absorbed counts by how much that is, about the root of 1 - alpha.
+constexpr int kMostAround = 64, kLeastOfMost = 4, kFewestAround = 4;
+constexpr float kRootOfMost = 0.25f;
+
+int rays_around(const PointSet& points, const Medium& medium) {
+    float most = 0.0f;  // of 1 - alpha
+    for (int c = 0; c < 3; ++c) {
+        most = std::max(most, medium.sigma_a[c] / (medium.sigma_a[c] + medium.sigma_s_prime[c]));
+    }
+    const float many = std::clamp(std::sqrt(most) / kRootOfMost, 1.0f / kLeastOfMost, 1.0f) * kMostAround;
+    const float free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
+    return rays_each(points, free_path, static_cast<int>(std::bit_ceil(static_cast<unsigned>(many))), kFewestAround);
+}
 
 struct Way {
-    float length;   // to where the body ends, metres
+    float length;   // to where the body ends, metres; below zero where it begins outside
     float inwards;  // its cosine to the way inwards
 };
 
+// From its centre.
+V3f place_in(const std::array<V3f, 2>& axes, std::uint32_t sequence, std::uint32_t sample) {
+    Sampler sampler(kSeed + 4, sequence, sample);
+    sampler.set_dimension(2);  // whose samples come in another order than directions
+    const V2f u = sampler.next_2d();
+    const float r = std::sqrt(u.x), phi = 2.0f * kPi * u.y;
+    return axes[0] * (r * std::cos(phi)) + axes[1] * (r * std::sin(phi));
+}
+
 // `first` is the number of which[0] among all points.
-std::vector<Way> ways_around(const PointSet& points, std::span<const V3f> places, std::span<const std::uint32_t> which,
+std::vector<Way> ways_around(const PointSet& points, const FirstScattering& below, std::span<const std::uint32_t> which,
                              std::size_t first, const ScrambledNet& net, const ChordFinder& finder) {
     std::vector<Ray> rays;
     std::vector<Way> ways;
     std::vector<V2f> u(net.size());
     for (const std::uint32_t point : which) {
-        net.draw_part(kSeed + 3, static_cast<std::uint32_t>(first++), u);
-        for (const V2f& sample : u) {
-            rays.push_back({places[point], uniform_sphere(sample)});
+        const auto sequence = static_cast<std::uint32_t>(first++);
+        net.draw_part(kSeed + 3, sequence, u);
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            V3f place = below.centers[point];
+            if (!below.axes.empty()) place += place_in(below.axes[point], sequence, static_cast<std::uint32_t>(i));
+            rays.push_back({place, uniform_sphere(u[i])});
             ways.push_back({0.0f, -points.normals[point].dot(rays.back().direction)});
         }
     }
-    const std::vector<float> lengths = finder.ways_out(rays);
+    const std::vector<float> lengths = below.axes.empty() ? finder.ways_out(rays) : finder.ways_out_if_inside(rays);
     for (std::size_t i = 0; i < ways.size(); ++i) ways[i].length = lengths[i];
     return ways;
 }
@@ -116,10 +141,6 @@ ThinMedium ThinMedium::of(const Medium& medium, float traced) {
     return thin;
 }
 
-float ThinMedium::sigma_t() const {
-    return mean_component(medium.sigma_s_prime + medium.sigma_a);
-}
-
 Rgb thin_gain(const Rgb& exponent, const Rgb& plane) {
     Rgb gain(1.0f);
     for (int c = 0; c < 3; ++c) {
@@ -130,7 +151,7 @@ Rgb thin_gain(const Rgb& exponent, const Rgb& plane) {
     return gain;
 }
 
-Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayScene& scene, const ThinMedium& thin,
+Thinness thinness(const PointSet& points, FirstScattering below, const RayScene& scene, const ThinMedium& thin,
                   float seen_through, const Shells* shells, PlacementMask mask) {
     const Medium& medium = thin.medium;
     Rgb once(0.0f);  // light of one scattering that a half space returns and rays trace
@@ -145,19 +166,19 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
     }
     // Of light that is scattered once in an index-matched half space, from all around [Chandrasekhar1960].
     const float matched_once = 2.0f / 3.0f * (1.0f - std::log(2.0f));
-    Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(2 * points.size(), Rgb(0.0f))};
+    Thinness result{std::vector<Rgb>(points.size(), Rgb(1.0f)), std::vector<Rgb>(2 * points.size(), Rgb(0.0f)),
+                    std::vector<float>(points.size(), 0.0f)};
     if (medium.sigma_a == Rgb(0.0f)) return result;
     const float free_path = 1.0f / max_component(medium.sigma_s_prime + medium.sigma_a);
     const ChordFinder finder(scene, shells, mask,
                              rays_each(points, free_path, ChordFinder::kMost, ChordFinder::kFewest));
-    const ScrambledNet net(rays_each(points, free_path, kMostAround, kFewestAround));
+    const ScrambledNet net(rays_around(points, medium));
     const std::size_t around = net.size();
-    std::vector<V3f> on_surface;
-    if (below.empty()) {
+    if (below.centers.empty()) {
         for (std::size_t k = 0; k < points.size(); ++k) {
-            on_surface.push_back(offset_origin(points.positions[k], -points.normals[k]));
+            below.centers.push_back(offset_origin(points.positions[k], -points.normals[k]));
+            below.depths.push_back((below.centers[k] - points.positions[k]).dot(-points.normals[k]));
         }
-        below = on_surface;
     }
     const std::vector<std::uint32_t> order = morton_order(points.positions);
     parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
@@ -173,7 +194,11 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
             const std::span ways = std::span(all_ways).subspan(at * around, around);
             const std::size_t k = which[at];
             if (!finder.is_closed(chords)) continue;
-            const float depth = (below[k] - points.positions[k]).dot(-points.normals[k]);
+            const auto inside =
+                std::count_if(ways.begin(), ways.end(), [](const Way& way) { return way.length >= 0.0f; });
+            if (inside == 0) continue;
+            result.known[k] = float(inside) / float(around);
+            const float depth = below.depths[k];
             for (int c = 0; c < 3; ++c) {
                 const float scatter = medium.sigma_s_prime[c], all_of = scatter + medium.sigma_a[c];
                 if (!(medium.sigma_a[c] > 0.0f && scatter > 0.0f)) continue;
@@ -181,13 +206,14 @@ Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayS
                 const bool is_on_surface = depth * all_of < kOnSurface;
                 float sum = 0.0f, slope = 0.0f;
                 for (const Way& way : ways) {
+                    if (way.length < 0.0f) continue;
                     const EvenLight::Exponent there = light.along(way.length * all_of);
                     sum += there.value;
                     if (!is_on_surface || way.inwards > 0.0f) slope += there.slope * way.inwards;
                 }
                 const EvenLight::Exponent plane_there = light.half_space(depth * all_of);
-                slope = slope / float(around) - (is_on_surface ? 0.0f : plane_there.slope);
-                const float at_surface = sum / float(around) - plane_there.value - slope * depth * all_of;
+                slope = slope / float(inside) - (is_on_surface ? 0.0f : plane_there.slope);
+                const float at_surface = sum / float(inside) - plane_there.value - slope * depth * all_of;
                 // Sums over the chords of what is absorbed, what goes straight through or is scattered once, and how much
                 // of these a white body would let through: the core's light stands for the rest of it.
                 float absorbed = 0.0f, traced_out = 0.0f, clear = 0.0f, plane = 0.0f, thick = 0.0f, deep = 0.0f;

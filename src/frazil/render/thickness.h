@@ -12,7 +12,6 @@
 #pragma once
 
 #include <array>
-#include <span>
 #include <vector>
 
 #include "frazil/geometry/ray_scene.h"
@@ -23,11 +22,6 @@
 
 namespace frazil {
 
-// Of the channels.
-inline float mean_component(const Rgb& c) {
-    return (c.x + c.y + c.z) / 3.0f;
-}
-
 // A medium as thin parts know it.
 struct ThinMedium {
     Medium medium;
@@ -35,9 +29,16 @@ struct ThinMedium {
     float traced = 0.0f;                  // of the light of one scattering, how much rays trace
 
     static ThinMedium of(const Medium& medium, float traced);
-    float sigma_t() const;  // 1/m; the mean of the channels
     // What of even light a half space's core returns, less what rays trace, over the part that it fills.
     Rgb plane = Rgb(1.0f);
+};
+
+// Where light is scattered first around each point, on the mean.
+struct FirstScattering {
+    std::vector<V3f> centers;
+    std::vector<float> depths;  // below the planes of the points, or of their cells
+    // Half axes of the ellipses, evenly filled, that stand for the points' cells; empty where the centers stand for them.
+    std::vector<std::array<V3f, 2>> axes;
 };
 
 // Per point.
@@ -45,12 +46,15 @@ struct Thinness {
     std::vector<Rgb> gain;  // what the core returns over what a half space's does, both less what is traced
     // (N, 2): Z at the surface, and what it grows by per free path inwards; below zero where the surface is hollow.
     std::vector<Rgb> exponent;
+    // How much of its cell knows the exponent, 0..1: none where chords do not end, or where it is so thin that the place below
+    // is outside.
+    std::vector<float> known;
 };
 
-// `below` are the places where light is scattered first, one per point, on the mean; the points themselves where it is empty.
+// Light is scattered first `below` the points; at the points themselves where there are no such centers.
 // `seen_through`, 0..1: how much of what goes straight through rays trace on (IceMaterial::refraction). `shells` that are one
 // body: chords end where the last of them is left. Else they end at what `mask` lets them meet.
-Thinness thinness(const PointSet& points, std::span<const V3f> below, const RayScene& scene, const ThinMedium& medium,
+Thinness thinness(const PointSet& points, FirstScattering below, const RayScene& scene, const ThinMedium& medium,
                   float seen_through = 0.0f, const Shells* shells = nullptr, PlacementMask mask = nullptr);
 
 // What is sent over what a half space sends, `plane`, where thin parts add `exponent`.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "frazil/base/morton_order.h"
 #include "frazil/points/point_blend.h"
@@ -13,7 +14,7 @@ namespace {
 constexpr float kCoarser = 4.0f;
 // How far the mean reaches, at least; kOfDecay of the length over which light is absorbed, 1/sigma_tr [Jensen2001], as that is
 // how far thickness is felt.
-constexpr float kSpacings = 1.5f, kOfDecay = 0.7f;
+constexpr float kSpacings = 2.0f, kOfDecay = 0.7f;
 // Points nearer to each other than this part of the reach tell no more of it together than some of them.
 constexpr float kFewestApart = 0.2f;
 constexpr float kFacesAlike = 0.9f;  // cosine
@@ -27,6 +28,13 @@ float decay_length(const Medium& medium) {
     return most > 0.0f ? 1.0f / std::sqrt(most) : 0.0f;
 }
 
+// Where their cells are, with as much area as is known of.
+PointSet known_points(PointSet points, const Cells* cells, const Thinness& known) {
+    if (cells) points.positions = cells->centroids;
+    for (std::size_t k = 0; k < points.size(); ++k) points.areas[k] *= known.known[k];
+    return points;
+}
+
 struct FewPoints {
     PointSet points;
     std::vector<Rgb> exponents;
@@ -34,31 +42,38 @@ struct FewPoints {
 
 // Of points that follow one another along a curve one stands for those that face as it does, with their mean.
 FewPoints few_points(const PointSet& points, const std::vector<Rgb>& exponents, float apart) {
+    struct Alike {
+        std::uint32_t first;
+        Rgb exponents[2] = {Rgb(0.0f), Rgb(0.0f)};
+        V3f place{0.0f}, normal{0.0f};
+        float area = 0.0f;
+    };
     const double closer = double(apart) / points.spacing;
     const std::size_t run = std::max<std::size_t>(1, static_cast<std::size_t>(closer * closer));
     const std::vector<std::uint32_t> order = morton_order(points.positions);
     FewPoints few;
+    std::vector<Alike> sets;
     for (std::size_t begin = 0; begin < order.size(); begin += run) {
-        const std::size_t end = std::min(begin + run, order.size());
-        const std::uint32_t first = order[begin];
-        Rgb sum[2] = {Rgb(0.0f), Rgb(0.0f)};
-        V3f place(0.0f), normal(0.0f);
-        float area = 0.0f;
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::uint32_t k = order[i];
-            if (points.normals[k].dot(points.normals[first]) < kFacesAlike) continue;
-            const float own = points.areas[k];
-            sum[0] += exponents[2 * k] * own;
-            sum[1] += exponents[2 * k + 1] * own;
-            place += (points.positions[k] - points.positions[first]) * own;
-            normal += points.normals[k] * own;
-            area += own;
+        sets.clear();
+        for (const std::uint32_t k : std::span(order).subspan(begin, std::min(run, order.size() - begin))) {
+            const float area = points.areas[k];
+            if (!(area > 0.0f)) continue;
+            auto of = std::find_if(sets.begin(), sets.end(), [&](const Alike& set) {
+                return points.normals[k].dot(points.normals[set.first]) > kFacesAlike;
+            });
+            if (of == sets.end()) of = sets.insert(sets.end(), Alike{.first = k});
+            of->exponents[0] += exponents[2 * k] * area;
+            of->exponents[1] += exponents[2 * k + 1] * area;
+            of->place += (points.positions[k] - points.positions[of->first]) * area;
+            of->normal += points.normals[k] * area;
+            of->area += area;
         }
-        if (!(area > 0.0f)) continue;
-        few.points.positions.push_back(points.positions[first] + place / area);
-        few.points.normals.push_back(normal.normalized());
-        few.points.areas.push_back(area);
-        few.exponents.insert(few.exponents.end(), {sum[0] / area, sum[1] / area});
+        for (const Alike& set : sets) {
+            few.points.positions.push_back(points.positions[set.first] + set.place / set.area);
+            few.points.normals.push_back(set.normal.normalized());
+            few.points.areas.push_back(set.area);
+            few.exponents.insert(few.exponents.end(), {set.exponents[0] / set.area, set.exponents[1] / set.area});
+        }
     }
     few.points.spacing = std::max(points.spacing, static_cast<decltype(points.spacing)>(apart));
     return few;
@@ -66,12 +81,14 @@ FewPoints few_points(const PointSet& points, const std::vector<Rgb>& exponents, 
 
 }  // namespace
 
-ThinField::ThinField(const PointSet& points, const std::vector<Rgb>& exponents, std::shared_ptr<const PointTree> tree,
-                     std::shared_ptr<const ThinMedium> medium)
+ThinField::ThinField(const PointSet& points, const Cells* cells, const Thinness& known,
+                     std::shared_ptr<const PointTree> tree, std::shared_ptr<const ThinMedium> medium)
     : tree_(std::move(tree)), medium_(std::move(medium)) {
-    if (!PointBlend::suits(points)) return;
+    const PointSet here = known_points(points, cells, known);
+    is_empty_ = std::all_of(here.areas.begin(), here.areas.end(), [](float area) { return area == 0.0f; });
+    if (is_empty_ || !PointBlend::suits(points)) return;
     reach_ = std::max(kSpacings * static_cast<float>(points.spacing), kOfDecay * decay_length(medium_->medium));
-    const FewPoints few = few_points(points, exponents, kFewestApart * reach_);
+    const FewPoints few = few_points(here, known.exponent, kFewestApart * reach_);
     lookup_.emplace(few.points, reach_);
     for (const std::uint32_t i : lookup_->order()) {
         exponents_.insert(exponents_.end(), {few.exponents[2 * i], few.exponents[2 * i + 1]});
@@ -81,7 +98,7 @@ ThinField::ThinField(const PointSet& points, const std::vector<Rgb>& exponents, 
 
 // False where no point is near.
 bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb* exponents) const {
-    const float sigma_t = medium_->sigma_t(), mean = mean_component(depth), own = mean / sigma_t;
+    const float sigma_t = mean_sigma_t(medium_->medium), mean = mean_component(depth), own = mean / sigma_t;
     const V3f above = place + normal * own;
     const float scale = 1.0f / (reach_ * reach_);
     float sum = 0.0f, below = 0.0f;  // below the planes of the points, metres
@@ -131,7 +148,7 @@ std::vector<Rgb> ThinField::at(const AbsorbingPlaces& places, const std::vector<
 }
 
 std::vector<Rgb> ThinField::inside(const std::vector<V3f>& places, const GatherOptions& options) const {
-    if (places.empty()) return {};
+    if (places.empty() || is_empty_) return std::vector<Rgb>(2 * places.size(), Rgb(0.0f));
     const Gathered sums =
         tree_->gather(places.data(), places.size(), {kCoarser * options.tolerance, Estimator::sum, false});
     std::vector<Rgb> result(2 * places.size(), Rgb(0.0f));

@@ -27,8 +27,8 @@ struct AbsorbingPlaces {
 
 class ThinField {
   public:
-    // `exponents` (N, 2) as in Thinness; `tree` sums them.
-    ThinField(const PointSet& points, const std::vector<Rgb>& exponents, std::shared_ptr<const PointTree> tree,
+    // `cells` of the points, may be null; `tree` sums the exponents.
+    ThinField(const PointSet& points, const Cells* cells, const Thinness& known, std::shared_ptr<const PointTree> tree,
               std::shared_ptr<const ThinMedium> medium);
 
     // (N, 2), as in Thinness, for places below a surface; `below` are those where their light is summed.
@@ -42,6 +42,7 @@ class ThinField {
 
     std::shared_ptr<const PointTree> tree_;
     std::shared_ptr<const ThinMedium> medium_;
+    bool is_empty_ = false;  // nothing is known
     float reach_ = 0.0f;
     std::optional<PointLookup> lookup_;
     std::vector<Rgb> exponents_;  // in the order of the lookup

@@ -17,6 +17,11 @@ struct Medium {
     float eta = 1.31f;  // ice
 };
 
+// Over the channels, 1/m.
+inline float mean_sigma_t(const Medium& medium) {
+    return mean_component(medium.sigma_s_prime + medium.sigma_a);
+}
+
 // Refuse coefficients out of range: ValueError beginning with `path`.
 void check_medium(const Medium& medium, const std::string& path);
 
