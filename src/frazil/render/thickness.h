@@ -1,6 +1,6 @@
 // How much more light leaves a thin part of a body than the thick plane that profiles assume: its paths are shorter.
 // Model: in even light a place inside scatters J = 1 - exp(-<y>) (translucency/even_light.h), <y> the mean over directions to
-//   where the body ends, by rays from below each point. What that is more than in a half space at the same depth,
+//   where the body ends, by rays from below each point's cell. What that is more than in a half space at the same depth,
 //   Z = <y> - Y(tau), varies slowly; a ray that leaves towards mu is sent 1 - e^{-Z} (1 - r), r what a half space sends there,
 //   Z where the rest is absorbed.
 //   Where bodies are seen through, e^{-sigma_t c} of the light goes straight on and is seen as such, c a chord; what is left,
