@@ -116,7 +116,7 @@ TEST_CASE("thin field: cells of sparse points tell what a body is, wherever the 
 }
 
 TEST_CASE("thin field: points that stand for others near them lose none on another side of an edge") {
-    // As many to a place as are merged, and as few as none is.
+    // So dense that they are merged, and so sparse that none is.
     const Cube merged(0.004), plain(0.03);
     float traced = 0.0f;
     for (const float from_edge : {0.05f, 0.1f}) {

@@ -31,19 +31,25 @@ std::shared_ptr<const PointClusters> PointCloud::clusters() {
     const std::lock_guard lock(mutex_);
     if (clusters_) return clusters_;
     PointSet points = points_;
-    Cells cells;
-    if (cells_) {
-        cells.areas = cells_->areas;
-        cells.centroids = cells_->centroids;
-        cells.covariances = cells_->covariances;
-    }
     for (std::size_t k = 0; k < room_.inwards.size(); ++k) {
-        const float outwards = -depth_ * room_.inwards[k];
-        points.positions[k] += points_.normals[k] * outwards;
-        if (cells_) move_along_normals(outwards, cells_->normals[k], cells.centroids[k], cells.covariances[k]);
+        points.positions[k] += points_.normals[k] * (-depth_ * room_.inwards[k]);
     }
+    const Cells cells = cells_inwards();
     clusters_ = std::make_shared<const PointClusters>(cluster_points(points, cells_ ? &cells : nullptr));
     return clusters_;
+}
+
+Cells PointCloud::cells_inwards() const {
+    Cells cells;
+    if (!cells_) return cells;
+    cells.areas = cells_->areas;
+    cells.centroids = cells_->centroids;
+    cells.covariances = cells_->covariances;
+    for (std::size_t k = 0; k < room_.inwards.size(); ++k) {
+        const float outwards = -depth_ * room_.inwards[k];
+        move_along_normals(outwards, cells_->normals[k], cells.centroids[k], cells.covariances[k]);
+    }
+    return cells;
 }
 
 std::shared_ptr<const PointClusters> PointCloud::surface_clusters() {
@@ -103,14 +109,14 @@ void PointCloud::move_inwards(std::vector<V3f>& moments, std::size_t groups) con
 FirstScattering PointCloud::first_scattering() const {
     FirstScattering result{inward_positions(), {}, {}};
     const std::lock_guard lock(mutex_);
+    result.depths.assign(points_.size(), 0.0f);
+    for (std::size_t k = 0; k < room_.inwards.size(); ++k) result.depths[k] = depth_ * room_.inwards[k];
+    if (!cells_) return result;
+    Cells cells = cells_inwards();
     for (std::size_t k = 0; k < points_.size(); ++k) {
-        result.depths.push_back(room_.inwards.empty() ? 0.0f : depth_ * room_.inwards[k]);
-        if (!cells_) continue;
-        Covariance covariance = cells_->covariances[k];
-        result.centers[k] = cells_->centroids[k];
-        move_along_normals(-result.depths[k], cells_->normals[k], result.centers[k], covariance);
-        result.axes.push_back(ellipse_of(covariance, points_.normals[k]));
+        result.axes.push_back(ellipse_of(cells.covariances[k], points_.normals[k]));
     }
+    result.centers = std::move(cells.centroids);
     return result;
 }
 

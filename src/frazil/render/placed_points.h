@@ -56,6 +56,9 @@ class PointCloud {
     std::shared_ptr<const PointLookup> lookup();
 
   private:
+    // Their moments alone, where light is scattered first; with the lock held.
+    Cells cells_inwards() const;
+
     PointSet points_;
     mutable std::mutex mutex_;  // over what follows
     std::shared_ptr<const Cells> cells_;
