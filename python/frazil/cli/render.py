@@ -11,6 +11,7 @@ import typer
 
 from ..tolerance import RENDER_TOLERANCE
 from ..warning import FrazilWarning
+from .bake_options import BakeBounces, BakeError, BakeSamples, TranslucentShadows
 from .checks import checked_resolution, misused, one_of, positive, refuse_unreadable, refuse_unwritable, within
 from .frames import authored_resolution, fill_pattern, has_pattern, parse_frames
 from .progress import PROGRESS_KINDS, make_progress
@@ -85,28 +86,10 @@ def render_command(
     spacing_pixels: Annotated[
         float, typer.Option(metavar="PIXELS", help="Points no nearer than so many pixels, so that far ice takes fewer.")
     ] = 0.0,
-    bake_samples: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="Shadow rays per point and light, and as many that look for bounced light. 0 = 32, fewer where points "
-            "are closer than half a mean free path.",
-        ),
-    ] = 0,
-    bake_error: Annotated[
-        float,
-        typer.Option(metavar="ERROR", help="Relative error of a point's light until which it gets more rays. 0 = off."),
-    ] = 0.0,
-    translucent_shadows: Annotated[
-        bool, typer.Option("--translucent-shadows", help="Shadow rays of the bake go on through ice, dimmed.")
-    ] = False,
-    bake_bounces: Annotated[
-        int,
-        typer.Option(
-            metavar="N",
-            help="Of light that reaches ice by way of ice and diffuse surfaces. From 3 on, what is left is added.",
-        ),
-    ] = 4,
+    bake_samples: BakeSamples = 0,
+    bake_error: BakeError = 0.0,
+    translucent_shadows: TranslucentShadows = False,
+    bake_bounces: BakeBounces = 4,
     tolerance: Annotated[float, typer.Option(help="Relative error of a translucency gather.")] = RENDER_TOLERANCE,
     estimator: Annotated[str, typer.Option(metavar="NAME", help="noise_free or sum.")] = "noise_free",
     compression: Annotated[
