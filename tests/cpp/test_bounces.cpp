@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <cmath>
+
 #include "scenes.h"
 
 using namespace frazil;
@@ -64,6 +66,28 @@ TEST_CASE("furnace of two white spheres with a boundary: every point gets what a
     }
     CHECK(all == doctest::Approx(1.0).epsilon(0.003));
     CHECK(near / count == doctest::Approx(1.0).epsilon(0.01));  // between the two; 0.9 without what ice reflects
+}
+
+TEST_CASE("furnace of two white spheres: a ray gets from ice in its way what it does not get from the sky") {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.0f, 0.3f, CompensationMode::conserve));
+    M44f beside;
+    beside.translate(V3f(0.0f, 2.01f, 0.0f));
+    scene.objects.push_back({"/other", 0, 0, beside});
+    scene.lights = {dome(Rgb(1.0f))};
+    RenderOptions options = small();
+    options.bake_bounces = 8;
+    options.bake_samples = 8;
+    options.spacing = 0.08f;
+    const auto spread = [&] {
+        const LitPoints lit = bake(scene, options).bake.bodies[0];
+        double squares = 0.0;
+        for (const Rgb& value : lit.irradiance) squares += std::pow(double(value.x) / kPi - 1.0, 2.0);
+        return std::sqrt(squares / double(lit.irradiance.size()));
+    };
+    const double together = spread();
+    options.bake_bounces = 0;
+    MESSAGE("spread " << together << ", of the sky alone " << spread());
+    CHECK(together < 0.02);
 }
 
 TEST_CASE("a convex body alone sees no ice: bounces change no bit") {

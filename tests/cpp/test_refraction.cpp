@@ -138,6 +138,25 @@ TEST_CASE("white furnace: clear, cloudy and bubbly ice without absorption is inv
     }
 }
 
+TEST_CASE("boundaries that reflect nothing: what is seen through several bodies has no noise") {
+    const float sigma_a = 1.0f;
+    Scene scene = scene_of(box_of({-9, -9, -0.2f}, {9, 9, 0.2f}), clear_ice(Rgb(sigma_a), 1.0f, 0.3f));
+    model(scene).translucency = 0.0f;
+    for (const float z : {-1.0f, -2.0f}) {
+        M44f behind;
+        behind.translate(V3f(0.0f, 0.0f, z));
+        scene.objects.push_back({"/behind", 0, 0, behind});
+    }
+    scene.lights = {dome(Rgb(1.0f))};
+    scene.camera.focal_length = 2000.0f;
+    RenderOptions options = small();
+    options.samples = 4;
+    const Film film = render(scene, options).film;
+    for (int x = 0; x < film.width; ++x) {
+        CHECK(pixel(film, "beauty", x, x)[1] == doctest::Approx(std::exp(-3.0f * 0.4f * sigma_a)).epsilon(1e-3));
+    }
+}
+
 TEST_CASE("Beer-Lambert: a clear slab dims what is behind by exp(-sigma_a d) between two boundaries") {
     // A box 0.4 m thick; the camera looks along its normal at a white sky.
     const Mesh box = box_of({-9, -9, -0.2f}, {9, 9, 0.2f});

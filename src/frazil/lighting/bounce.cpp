@@ -40,7 +40,9 @@ Irradiance bake_bounce(const PointSet& points, const RayScene& scene, std::size_
         for (std::size_t k = begin; k < end; ++k) {
             const std::uint32_t i = order[k];
             find_places(points, options.cells, i, places);
-            net.draw_part(hash(options.seed, 0x626f756eU), std::uint32_t(k), u);
+            // The very rays by which an even dome is sampled: what ice in their way sends stands for the sky that it hides,
+            // so that the sum of both has less noise than either.
+            net.draw_part(options.seed, std::uint32_t(k), u);
             deal(places, 0, hash(options.seed, i), place_of);
             for (std::size_t sample = 0; sample < u.size(); ++sample) {
                 const Place& place = places[place_of[sample]];

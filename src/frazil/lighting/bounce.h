@@ -1,8 +1,8 @@
 // Light that reaches points by way of other surfaces: one bounce per call.
 // Model: E = ∫ L(x', -w) T(cos) cos dw over the directions in which a surface is seen, by cosine-distributed
-//   quasi-Monte Carlo rays; what the surface sends is the caller's: reflected_light() for opaque diffuse surfaces, a
-//   gather at the hit for ice (then ice lights ice). Each hit tells its weight in the point's irradiance, so that a caller
-//   that keeps them can let light bounce again without another ray.
+//   quasi-Monte Carlo rays, those of an even dome (irradiance.h); what the surface sends is the caller's:
+//   reflected_light() for opaque diffuse surfaces, a gather at the hit for ice (then ice lights ice). Each hit tells its
+//   weight in the point's irradiance, so that a caller that keeps them can let light bounce again without another ray.
 // Units: W/m² for irradiance, W/m²/sr for radiance.
 // Valid: the same bits for any number of threads where the caller's function is one of its arguments alone.
 // Not: light straight from lights (irradiance.h), glossy surfaces.

@@ -216,17 +216,18 @@ void PathTracer::follow(Path& path, const FirstHit* first, const V3f* view_axis,
                 split = nullptr;
             } else {
                 // Either reflect or enter, by how much goes either way.
-                reflection_odds =
-                    std::clamp(1.0f - leaving * (1.0f - luminance(surface.covering.reflectance)), 0.05f, 0.95f);
+                const float reflected = 1.0f - leaving * (1.0f - luminance(surface.covering.reflectance));
+                reflection_odds = shader.scatters() ? std::clamp(reflected, 0.05f, 0.95f) : 0.0f;
                 if (path.sampler.next_1d() >= reflection_odds) {
                     // The light that comes straight from lights is the reflection's, whichever way the path goes.
-                    add_direct_light(path, surface, shader, wo, path.sampler, tile);
+                    if (shader.scatters()) add_direct_light(path, surface, shader, wo, path.sampler, tile);
                     if (!enter(path, surface, crossing, (1.0f - reflection_odds) / leaving, core, path.sampler)) return;
                     continue;
                 }
             }
         }
 
+        if (!shader.scatters()) return;
         add_direct_light(path, surface, shader, wo, path.sampler, tile);
         if (!reflect(path, surface, shader, wo, reflection_odds)) return;
         split = nullptr;

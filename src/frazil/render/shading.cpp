@@ -33,6 +33,11 @@ float Shader::terminator(const V3f& wi) const {
     return g * (1.0f + g * (1.0f - g));
 }
 
+bool Shader::scatters() const {
+    return standard_ || reflectance_ != Rgb(0.0f) ||
+           (body_->material->specular > 0.0f && body_->boundary->eta() != 1.0f);
+}
+
 Rgb Shader::albedo(const V3f& wo) const {
     const V3f local_wo = to_local(wo);
     if (standard_) {

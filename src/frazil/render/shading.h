@@ -40,6 +40,8 @@ class Shader {
     float alpha() const { return standard_ ? standard_->alpha() : alpha_; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
+    // Whether it scatters any light: an index-matched boundary without overlays does not.
+    bool scatters() const;
     // The share of light from all around that goes towards wo, all lobes together.
     Rgb albedo(const V3f& wo) const;
 
