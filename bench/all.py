@@ -202,7 +202,7 @@ def main() -> None:
 def run_race(options: argparse.Namespace, peers: str) -> list[dict]:
     parser = argparse.ArgumentParser()
     race.add_options(parser)
-    chosen = parser.parse_args(["--sizes", "96", "256", "--samples", "32", "--cycles-spp", "64"])
+    chosen = parser.parse_args(["--sizes", "96", "256", "--samples", "8", "--cycles-spp", "64"])
     chosen.spp, chosen.threads = 1024 if options.full else 256, options.threads
     with tempfile.TemporaryDirectory() as temporary:
         return race.race(chosen, peers, Path(temporary))

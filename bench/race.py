@@ -1,12 +1,14 @@
 """Seconds to a picture of equal error: Frazil against Mitsuba 3 (volpath) and Cycles (random walk) on one body of ice.
 
-    python bench/race.py [--sizes 96 192] [--spp 64] [-o bench/results/race.json]
+    python bench/race.py [--sizes 96 192] [--spp 64] [--reference FILE.npz MESH.ply] [-o bench/results/race.json]
 
 A cluster of ice spires (frazil.formations) with an index-matched boundary, under light from all around and a lamp, in
-two media of different albedo. Mitsuba's volumetric paths are unbiased: the mean of its renders is the truth. Every
+two media of different albedo; or with --reference the body, medium, lights and camera of a path-traced reference, as in
+bench/truth.py. Mitsuba's volumetric paths are unbiased: the mean of its renders is the truth. Every
 renderer runs twice, with two seeds, in a process of its own:
 
-- noise: RMS of the two pictures' difference / sqrt(2), relative to the truth's RMS, over pixels that the body fills;
+- noise: RMS of the two pictures' difference / sqrt(2), relative to the truth's RMS, over all channels of pixels that the
+  body fills;
 - bias: RMS of the two pictures' mean less the truth, with what noise of both explains taken off (squares subtract);
 - seconds to a noise: of Monte Carlo renderers time goes as noise^-2, and the table says from which noise it is scaled.
   Frazil's time is that of its run, mesh to picture, points and bake included.
@@ -29,7 +31,7 @@ from pathlib import Path
 
 import numpy as np
 
-MEDIA = {"bright": (25.0, 0.1), "dark": (25.0, 1.5)}  # sigma_s' and sigma_a, 1/m
+MEDIA = {"bright": ([25.0] * 3, [0.1] * 3), "dark": ([25.0] * 3, [1.5] * 3)}  # sigma_s' and sigma_a, 1/m
 
 COMMON = """
 import json, resource, sys, time, numpy as np
@@ -53,10 +55,10 @@ FRAZIL = (
 import frazil as fz
 def scene():
     s = fz.Scene()
-    medium = fz.Medium((job['sigma_s'],) * 3, (job['sigma_a'],) * 3, eta=1.0)
+    medium = fz.Medium(job['sigma_s'], job['sigma_a'], eta=1.0)
     ice = s.add_material('/ice', fz.IceMaterial(medium))
     s.add_object('/body', s.add_mesh(fz.Mesh(V, F), '/body'), ice)
-    s.add_light(fz.Light(fz.DomeLight(), radiance=[job['env']] * 3, path='/env'))
+    s.add_light(fz.Light(fz.DomeLight(), radiance=job['env'], path='/env'))
     square = fz.RectLight(job['width'], job['width'])
     s.add_light(fz.Light(square, radiance=[job['radiance']] * 3, matrix=lamp, path='/lamp'))
     aperture = 2 * 50.0 * np.tan(job['fov'] / 2)
@@ -79,7 +81,7 @@ params['vertex_positions'] = V.ravel(); params['faces'] = F.ravel(); params.upda
 body.write_ply(job['out'] + '.ply')
 def transform(m): return mi.ScalarTransform4f(m.T)
 flip = np.diag([-1.0, 1.0, -1.0, 1.0])  # Mitsuba's cameras and rectangles look along +z
-total = job['sigma_s'] + job['sigma_a']
+total = np.add(job['sigma_s'], job['sigma_a']); most = float(total.max())
 half = np.diag([job['width'] / 2, job['width'] / 2, 1.0, 1.0])
 scene = mi.load_dict({'type': 'scene',
     'integrator': {'type': 'volpath', 'max_depth': -1, 'rr_depth': 1 << 20},
@@ -91,8 +93,9 @@ scene = mi.load_dict({'type': 'scene',
     'lamp': {'type': 'rectangle', 'to_world': transform(half @ flip @ lamp),
         'emitter': {'type': 'area', 'radiance': {'type': 'rgb', 'value': job['radiance']}}},
     'body': {'type': 'ply', 'filename': job['out'] + '.ply', 'face_normals': True, 'bsdf': {'type': 'null'},
-        'interior': {'type': 'homogeneous', 'albedo': {'type': 'rgb', 'value': job['sigma_s'] / total},
-                     'sigma_t': total, 'phase': {'type': 'isotropic'}}}})
+        'interior': {'type': 'homogeneous', 'albedo': {'type': 'rgb', 'value': (job['sigma_s'] / total).tolist()},
+                     'sigma_t': {'type': 'rgb', 'value': (total / most).tolist()}, 'scale': most,
+                     'phase': {'type': 'isotropic'}}}})
 np.array(mi.render(scene, spp=1, seed=999))  # compiles
 start = clock()
 picture = np.array(mi.render(scene, spp=job['spp'], seed=job['seed']))
@@ -116,21 +119,21 @@ def nodes_of(owner):
     return owner.node_tree
 world = bpy.data.worlds.new('w'); scene.world = world
 background = next(n for n in nodes_of(world).nodes if n.type == 'BACKGROUND')
-background.inputs['Color'].default_value = (1, 1, 1, 1); background.inputs['Strength'].default_value = job['env']
+background.inputs['Color'].default_value = (*job['env'], 1); background.inputs['Strength'].default_value = 1.0
 def add_mesh(name, vertices, faces, material, at=np.eye(4)):
     data = bpy.data.meshes.new(name); data.from_pydata(vertices.tolist(), [], faces.tolist())
     data.materials.append(material); item = bpy.data.objects.new(name, data)
     item.matrix_world = mathutils.Matrix(np.asarray(at).T.tolist()); scene.collection.objects.link(item)
 # Cycles maps (color, radius) to (alpha, sigma_t) [its subsurface_random_walk_remap]: the inverse of that.
-total = job['sigma_s'] + job['sigma_a']; alpha = job['sigma_s'] / total
+total = np.add(job['sigma_s'], job['sigma_a']); alpha = job['sigma_s'] / total
 colors = np.linspace(0, 1, 200001)
 alphas = 1 - np.exp(colors * (-5.09406 + colors * (2.61188 - colors * 4.31805)))
-color = float(np.interp(alpha, alphas, colors)); stretch = 1.9 - color + 3.5 * (color - 0.8) ** 2
+color = np.interp(alpha, alphas, colors); stretch = 1.9 - color + 3.5 * (color - 0.8) ** 2
 ice = bpy.data.materials.new('ice')
 surface = next(n for n in nodes_of(ice).nodes if n.type == 'BSDF_PRINCIPLED')
 surface.subsurface_method = 'RANDOM_WALK'
-for name, value in (('Base Color', (color,) * 3 + (1,)), ('Subsurface Weight', 1.0), ('Subsurface Scale', 1.0),
-                    ('Subsurface Radius', (1 / (total * stretch),) * 3), ('Specular IOR Level', 0.0)):
+for name, value in (('Base Color', (*color, 1)), ('Subsurface Weight', 1.0), ('Subsurface Scale', 1.0),
+                    ('Subsurface Radius', tuple(1 / (total * stretch))), ('Specular IOR Level', 0.0)):
     surface.inputs[name].default_value = value
 add_mesh('body', V, F, ice)
 glow = bpy.data.materials.new('glow'); tree = nodes_of(glow); tree.nodes.clear()
@@ -163,13 +166,48 @@ def look_at(eye, target) -> np.ndarray:
     return matrix
 
 
-def make_body(folder: Path, triangles: int) -> Path:
+def save_body(folder: Path, positions: np.ndarray, triangles: np.ndarray) -> str:
+    path = folder / "body.npz"
+    np.savez(path, V=positions.astype(np.float32), F=triangles.astype(np.int32))
+    return str(path)
+
+
+def spires(folder: Path, triangles: int) -> dict[str, dict]:
+    """The cluster's scenes by name of the medium."""
     import frazil as fz
 
     part = fz.formations.spire_cluster(seed=1, triangles=triangles).part("Ice")
-    path = folder / "body.npz"
-    np.savez(path, V=part.positions.astype(np.float32), F=part.triangles.astype(np.int32))
-    return path
+    scene = {
+        "mesh": save_body(folder, part.positions, part.triangles),
+        "camera": look_at((1.1, 1.6, 7.4), (0.0, 1.75, 0.0)).tolist(),
+        "fov": float(np.radians(36.0)),
+        "lamp": look_at((-5.0, 5.5, -2.0), (0.0, 1.5, 0.0)).tolist(),
+        "width": 2.5,
+        "env": [0.3] * 3,
+        "radiance": 12.0,
+    }
+    return {name: scene | {"sigma_s": scatter, "sigma_a": absorb} for name, (scatter, absorb) in MEDIA.items()}
+
+
+def reference_medium(folder: Path, reference: Path, mesh: Path) -> dict[str, dict]:
+    """The scene of a path-traced reference (bench/truth.py), by its name."""
+    import trimesh
+
+    params = json.loads(str(np.load(reference)["params"]))
+    shape = trimesh.load(mesh, process=False)
+    centre, target, half, radiance = params["light"]
+    scene = {
+        "mesh": save_body(folder, np.asarray(shape.vertices), np.asarray(shape.faces)),
+        "camera": look_at(*params["camera"]).tolist(),
+        "fov": float(np.radians(params["fov"])),
+        "lamp": look_at(centre, target).tolist(),
+        "width": 2.0 * half,
+        "env": params["env"],
+        "radiance": radiance,
+        "sigma_s": params["sigma_s_prime"],
+        "sigma_a": params["sigma_a"],
+    }
+    return {reference.stem: scene}
 
 
 def kept_file(cache: Path | None, name: str, job: dict) -> Path | None:
@@ -204,7 +242,7 @@ def run(python: str, name: str, job: dict, folder: Path, options: argparse.Names
 
 def arrays(out: Path) -> dict:
     result = dict(np.load(out))
-    result["picture"] = result["picture"][..., 0]  # grey media: one channel has it all, and no average over three
+    result["picture"] = result["picture"][..., :3]
     return result
 
 
@@ -214,17 +252,8 @@ def rms(values: np.ndarray) -> float:
 
 def race(options: argparse.Namespace, peers_python: str, folder: Path) -> list[dict]:
     """Rows by medium, size and renderer."""
-    job = {
-        "mesh": str(make_body(folder, options.triangles)),
-        "camera": look_at((1.1, 1.6, 7.4), (0.0, 1.75, 0.0)).tolist(),
-        "fov": float(np.radians(36.0)),
-        "lamp": look_at((-5.0, 5.5, -2.0), (0.0, 1.5, 0.0)).tolist(),
-        "width": 2.5,
-        "env": 0.3,
-        "radiance": 12.0,
-        "threads": options.threads,
-        "variant": options.variant,
-    }
+    media = reference_medium(folder, *options.reference) if options.reference else spires(folder, options.triangles)
+    job = {"threads": options.threads, "variant": options.variant}
     samples = {
         "frazil": options.samples,
         "frazil, spacing x 2": options.samples,
@@ -232,16 +261,16 @@ def race(options: argparse.Namespace, peers_python: str, folder: Path) -> list[d
         "cycles random walk": options.cycles_spp,
     }
     rows = []
-    for medium, (sigma_s, sigma_a) in MEDIA.items():
+    for medium, scene in media.items():
         for size in options.sizes:
             pairs = {}
             for name in options.only:
                 python = sys.executable if name.startswith("frazil") else peers_python
                 both = []
                 for seed in (1, 2):
-                    media = {"sigma_s": sigma_s, "sigma_a": sigma_a, "size": size, "seed": seed, "spp": samples[name]}
-                    media["spacing_scale"] = 2.0 if name.endswith("x 2") else 1.0
-                    both.append(run(python, name, job | media, folder, options))
+                    wanted = scene | {"size": size, "seed": seed, "spp": samples[name]}
+                    wanted["spacing_scale"] = 2.0 if name.endswith("x 2") else 1.0
+                    both.append(run(python, name, job | wanted, folder, options))
                     if isinstance(both[-1], str):
                         break
                 failed = [b for b in both if isinstance(b, str)]
@@ -251,20 +280,20 @@ def race(options: argparse.Namespace, peers_python: str, folder: Path) -> list[d
                 else:
                     pairs[name] = both
                     print(f"{medium} {size} {name}: {both[0]['cpu']:.1f} s", flush=True)
-            rows += compare(medium, size, pairs, samples)
+            rows += compare(medium, size, pairs, samples, np.array(scene["env"]))
             if options.pictures:
                 save_pictures(options.pictures, medium, size, pairs)
     return rows
 
 
-def compare(medium: str, size: int, pairs: dict, samples: dict) -> list[dict]:
+def compare(medium: str, size: int, pairs: dict, samples: dict, sky: np.ndarray) -> list[dict]:
     """Noise and bias of every renderer, against the mean of Mitsuba's two pictures."""
     if "mitsuba volpath" not in pairs:
         return []
     means = {name: 0.5 * (a["picture"] + b["picture"]) for name, (a, b) in pairs.items()}
     truth = means["mitsuba volpath"]
     # Pixels that the body fills: what is seen beside it is the sky, or nothing where a renderer has no background.
-    inside = body_pixels(truth)
+    inside = body_pixels(truth, sky)
     scale = rms(truth[inside])
     noises = {name: rms((a["picture"] - b["picture"])[inside]) / np.sqrt(2) / scale for name, (a, b) in pairs.items()}
     truth_noise = noises["mitsuba volpath"] / np.sqrt(2)
@@ -287,13 +316,13 @@ def compare(medium: str, size: int, pairs: dict, samples: dict) -> list[dict]:
     return rows
 
 
-def body_pixels(truth: np.ndarray) -> np.ndarray:
+def body_pixels(truth: np.ndarray, sky: np.ndarray) -> np.ndarray:
     """Not sky, whose radiance is exact in every sample, nor beside it."""
-    sky = np.abs(truth - 0.3) < 1e-4
-    grown = sky.copy()
+    is_sky = np.all(np.abs(truth - sky) < 1e-4, axis=-1)
+    grown = is_sky.copy()
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
-            grown |= np.roll(sky, (dy, dx), (0, 1))
+            grown |= np.roll(is_sky, (dy, dx), (0, 1))
     return ~grown
 
 
@@ -311,7 +340,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--spp", type=int, default=64, help="of Mitsuba, per run")
     parser.add_argument("--cycles-spp", type=int, default=16, help="of Cycles, per run")
     parser.add_argument("--samples", type=int, default=8, help="of Frazil")
-    parser.add_argument("--triangles", type=int, default=60_000)
+    parser.add_argument("--triangles", type=int, default=60_000, help="of the cluster of spires")
+    parser.add_argument(
+        "--reference", type=Path, nargs=2, metavar=("NPZ", "MESH"), help="instead of the spires: see bench/truth.py"
+    )
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("--variant", default="scalar_rgb", help="of Mitsuba: llvm_ad_rgb where its LLVM works")
     parser.add_argument("--limit", type=float, default=900.0, help="seconds a render may take")

@@ -25,8 +25,6 @@ constexpr double kDefaultSpacing = 0.5;
 constexpr double kMostByDefault = 1e6, kFewestByDefault = 1e3;
 // Places of a body that the bake keeps at once, 16 bytes each.
 constexpr std::size_t kMostPlaces = 32'000'000;
-// Rays that begin at one place of a cell: more places cost more than they save noise.
-constexpr int kRaysPerPlace = 4;
 // Of a cell. One is noisier than light at the points; two are not (tests/python/test_cells.py).
 constexpr int kFewestPlaces = 2;
 // Spacing over mean free path beyond which single points show.
@@ -238,9 +236,9 @@ std::vector<EnteringLight> bake_lights(const Scene& scene, const RayScene& ray_s
         std::shared_ptr<const Cells> cells;
         if (options.gather.estimator == Estimator::noise_free) {
             PointCloud& cloud = lit[i].points.cloud();
-            // Fewer where points are so many that their cells are small.
+            // No more than shadow rays; fewer where points are so many that their cells are small.
             const int places = std::clamp(static_cast<int>(kMostPlaces / cloud.points().size()), kFewestPlaces,
-                                          std::clamp(samples / kRaysPerPlace, 8, 256));
+                                          std::clamp(samples, 8, 256));
             cloud.add_cells(true, [&](const PointSet& points) {
                 return cells_of(points, mesh_at_cloud(scene, i, lit[i].points), places);
             });
