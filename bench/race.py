@@ -280,20 +280,20 @@ def race(options: argparse.Namespace, peers_python: str, folder: Path) -> list[d
                 else:
                     pairs[name] = both
                     print(f"{medium} {size} {name}: {both[0]['cpu']:.1f} s", flush=True)
-            rows += compare(medium, size, pairs, samples, np.array(scene["env"]))
+            rows += compare(medium, size, pairs, samples, scene)
             if options.pictures:
                 save_pictures(options.pictures, medium, size, pairs)
     return rows
 
 
-def compare(medium: str, size: int, pairs: dict, samples: dict, sky: np.ndarray) -> list[dict]:
+def compare(medium: str, size: int, pairs: dict, samples: dict, scene: dict) -> list[dict]:
     """Noise and bias of every renderer, against the mean of Mitsuba's two pictures."""
     if "mitsuba volpath" not in pairs:
         return []
     means = {name: 0.5 * (a["picture"] + b["picture"]) for name, (a, b) in pairs.items()}
     truth = means["mitsuba volpath"]
     # Pixels that the body fills: what is seen beside it is the sky, or nothing where a renderer has no background.
-    inside = body_pixels(truth, sky)
+    inside = body_pixels(truth, scene)
     scale = rms(truth[inside])
     noises = {name: rms((a["picture"] - b["picture"])[inside]) / np.sqrt(2) / scale for name, (a, b) in pairs.items()}
     truth_noise = noises["mitsuba volpath"] / np.sqrt(2)
@@ -316,9 +316,10 @@ def compare(medium: str, size: int, pairs: dict, samples: dict, sky: np.ndarray)
     return rows
 
 
-def body_pixels(truth: np.ndarray, sky: np.ndarray) -> np.ndarray:
-    """Not sky, whose radiance is exact in every sample, nor beside it."""
-    is_sky = np.all(np.abs(truth - sky) < 1e-4, axis=-1)
+def body_pixels(truth: np.ndarray, scene: dict) -> np.ndarray:
+    """Neither sky nor lamp, whose radiance is exact in every sample, nor beside them."""
+    is_sky = np.all(np.abs(truth - scene["env"]) < 1e-4, axis=-1)
+    is_sky |= np.any(np.abs(truth - scene["radiance"]) < 1e-3, axis=-1)
     grown = is_sky.copy()
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
