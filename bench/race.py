@@ -7,8 +7,8 @@ two media of different albedo; or with --reference the body, medium, lights and 
 bench/truth.py. Mitsuba's volumetric paths are unbiased: the mean of its renders is the truth. Every
 renderer runs twice, with two seeds, in a process of its own:
 
-- noise: RMS of the two pictures' difference / sqrt(2), relative to the truth's RMS, over all channels of pixels that the
-  body fills;
+- noise: RMS of the two pictures' difference / sqrt(2), relative to the truth's RMS, over all channels of the pixels
+  that the body fills;
 - bias: RMS of the two pictures' mean less the truth, with what noise of both explains taken off (squares subtract);
 - seconds to a noise: of Monte Carlo renderers time goes as noise^-2, and the table says from which noise it is scaled.
   Frazil's time is that of its run, mesh to picture, points and bake included.

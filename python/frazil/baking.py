@@ -34,7 +34,7 @@ from .warning import FrazilWarning
 __all__ = ["Bake", "bake", "load_bake", "refresh_bake", "save_bake"]
 
 _FORMAT = "frazil bake"
-_VERSION = 7
+_VERSION = 8
 # What a bake depends on; other options of a render leave it as it is.
 BAKE_OPTIONS = (
     "seed",
