@@ -141,10 +141,11 @@ def plot(rows: list[dict], path: Path) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator
 
     shown = [row for row in rows if "error" not in row]
     media = list(dict.fromkeys(row["medium"] for row in shown))
-    figure, axes = plt.subplots(1, len(media), figsize=(5.2 * len(media), 3.8), sharey=True, squeeze=False)
+    figure, axes = plt.subplots(1, len(media), figsize=(5.2 * len(media), 5.0), sharey=True, squeeze=False)
     colors = {name: f"C{i}" for i, name in enumerate(race.RENDERERS)}
     for axis, medium in zip(axes[0], media, strict=True):
         for row in (row for row in shown if row["medium"] == medium):
@@ -156,7 +157,14 @@ def plot(rows: list[dict], path: Path) -> None:
                 noise = np.array([row["noise"], 0.01])
                 axis.plot(row["seconds"] * (row["noise"] / noise) ** 2, 100 * noise, ":", color=colors[name], lw=1)
         axis.set(xscale="log", yscale="log", xlabel="processor s", title=f"{medium} ice")
-        axis.legend(fontsize=7, frameon=False)
+        where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2, "columnspacing": 0.8}
+        axis.legend(fontsize=7, frameon=False, handletextpad=0.2, **where)
+        axis.axhline(1.0, color="0.8", lw=1, zorder=0)
+        for scale in (axis.xaxis, axis.yaxis):
+            scale.set_major_formatter("{x:g}")
+            scale.set_minor_formatter("")
+        axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 3.0, 5.0)))
+        axis.yaxis.set_minor_formatter("{x:g}")
     axes[0, 0].set_ylabel("noise, %")
     figure.tight_layout()
     figure.savefig(path, dpi=80)

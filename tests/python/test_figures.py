@@ -61,19 +61,22 @@ def test_sheets_have_every_panel(tmp_path):
 
 def test_the_race_takes_noise_off_the_bias():
     random = np.random.default_rng(0)
-    truth = np.full((60, 60), 0.3)
+    sky, lamp = [0.3, 0.4, 0.5], 12.0
+    truth = np.full((60, 60, 3), sky)
+    truth[:4, :4] = lamp
     truth[10:50, 10:50] = 1.0
 
     def noisy(level, gain):
         picture = truth.copy()
-        picture[10:50, 10:50] = gain + level * random.normal(size=(40, 40))
+        picture[10:50, 10:50] = gain + level * random.normal(size=(40, 40, 3))
         return {"picture": picture, "cpu": 2.0, "wall": 1.0, "peak": 10**8}
 
     pairs = {
         "mitsuba volpath": [noisy(0.05, 1.0), noisy(0.05, 1.0)],
         "frazil": [noisy(0.005, 1.03), noisy(0.005, 1.03)],
     }
-    rows = {row["renderer"]: row for row in race.compare("m", 60, pairs, dict.fromkeys(pairs, 8))}
+    scene = {"env": sky, "radiance": lamp}
+    rows = {row["renderer"]: row for row in race.compare("m", 60, pairs, dict.fromkeys(pairs, 8), scene)}
     assert rows["mitsuba volpath"]["noise"] == pytest.approx(0.05, rel=0.1)
     assert rows["mitsuba volpath"]["to 1%"] == pytest.approx(2.0 * 25, rel=0.2)
     assert rows["frazil"]["bias"] == pytest.approx(0.03, rel=0.15)
