@@ -157,12 +157,12 @@ def plot(rows: list[dict], path: Path) -> None:
                 noise = np.array([row["noise"], 0.01])
                 axis.plot(row["seconds"] * (row["noise"] / noise) ** 2, 100 * noise, ":", color=colors[name], lw=1)
         axis.set(xscale="log", yscale="log", xlabel="processor s", title=f"{medium} ice")
-        where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2, "columnspacing": 0.8}
-        axis.legend(fontsize=7, frameon=False, handletextpad=0.2, **where)
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
+        axis.legend(fontsize=7, frameon=False, ncols=2, columnspacing=0.8, handletextpad=0.2, **below)
         axis.axhline(1.0, color="0.8", lw=1, zorder=0)
         for scale in (axis.xaxis, axis.yaxis):
             scale.set_major_formatter("{x:g}")
-            scale.set_minor_formatter("")
+        axis.xaxis.set_minor_formatter("")
         axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 3.0, 5.0)))
         axis.yaxis.set_minor_formatter("{x:g}")
     axes[0, 0].set_ylabel("noise, %")

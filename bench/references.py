@@ -146,7 +146,7 @@ def coverage(shape: trimesh.Trimesh, size: int) -> np.ndarray:
     import frazil as fz
 
     sys.path.insert(0, str(Path(__file__).parent))
-    from truth import look_at
+    from race import look_at
 
     scene = fz.Scene()
     mesh = scene.add_mesh(fz.Mesh(shape.vertices, shape.faces), "/body")

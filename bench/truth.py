@@ -17,19 +17,9 @@ import numpy as np
 import trimesh
 
 import frazil as fz
+from race import look_at
 
 MODES = ("ratio", "conserve", "depth")
-
-
-def look_at(origin: list[float], target: list[float]) -> np.ndarray:
-    """Local-to-world matrix, row vectors, of something at `origin` that looks along its -z at `target`, +y up."""
-    back = np.subtract(origin, target)
-    back = back / np.linalg.norm(back)
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    matrix = np.eye(4)
-    matrix[0, :3], matrix[1, :3], matrix[2, :3], matrix[3, :3] = right, np.cross(back, right), back, origin
-    return matrix
 
 
 def reference_scene(params: dict, mesh_file: Path, compensation: str, volume: float = 0.0) -> fz.Scene:

@@ -7,6 +7,20 @@
 using namespace frazil;
 using namespace frazil::test;
 
+namespace {
+
+// Almost in touch, under an even sky.
+Scene two_white_spheres(float eta) {
+    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), eta, 0.3f, CompensationMode::conserve));
+    M44f beside;
+    beside.translate(V3f(0.0f, 2.01f, 0.0f));
+    scene.objects.push_back({"/other", 0, 0, beside});
+    scene.lights = {dome(Rgb(1.0f))};
+    return scene;
+}
+
+}  // namespace
+
 TEST_CASE("furnace over a white floor: what the floor sends back takes the place of the sky that it hides") {
     Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.31f, 0.3f, CompensationMode::conserve));
     StandardMaterial white;
@@ -30,11 +44,7 @@ TEST_CASE("furnace over a white floor: what the floor sends back takes the place
 }
 
 TEST_CASE("furnace of two white spheres: ice lights ice until it cannot be told from the sky") {
-    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.0f, 0.3f, CompensationMode::conserve));
-    M44f beside;
-    beside.translate(V3f(0.0f, 2.01f, 0.0f));
-    scene.objects.push_back({"/other", 0, 0, beside});
-    scene.lights = {dome(Rgb(1.0f))};
+    const Scene scene = two_white_spheres(1.0f);
     RenderOptions options = small();
     options.bake_bounces = 6;
     CHECK(mean_inside(render(scene, options).film, "translucency", 0) == doctest::Approx(1.0).epsilon(0.01));
@@ -43,11 +53,7 @@ TEST_CASE("furnace of two white spheres: ice lights ice until it cannot be told 
 }
 
 TEST_CASE("furnace of two white spheres with a boundary: every point gets what an open sky would send") {
-    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.31f, 0.3f, CompensationMode::conserve));
-    M44f beside;
-    beside.translate(V3f(0.0f, 2.01f, 0.0f));
-    scene.objects.push_back({"/other", 0, 0, beside});
-    scene.lights = {dome(Rgb(1.0f))};
+    const Scene scene = two_white_spheres(1.31f);
     RenderOptions options = small();
     options.bake_bounces = 8;
     options.bake_samples = 256;
@@ -69,11 +75,7 @@ TEST_CASE("furnace of two white spheres with a boundary: every point gets what a
 }
 
 TEST_CASE("furnace of two white spheres: a ray gets from ice in its way what it does not get from the sky") {
-    Scene scene = scene_of(sphere(1.0f, 4), ice(Rgb(1e-6f), 1.0f, 0.3f, CompensationMode::conserve));
-    M44f beside;
-    beside.translate(V3f(0.0f, 2.01f, 0.0f));
-    scene.objects.push_back({"/other", 0, 0, beside});
-    scene.lights = {dome(Rgb(1.0f))};
+    const Scene scene = two_white_spheres(1.0f);
     RenderOptions options = small();
     options.bake_samples = 8;
     options.spacing = 0.08f;

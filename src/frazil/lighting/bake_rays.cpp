@@ -130,6 +130,7 @@ void RayMaker::make_rays(std::uint32_t point, const BakeTask& task, std::uint32_
         });
         if (rays.samples.front().is_delta) one_each(world_light, rays);
     } else if (world_light.is_uniform_dome() && !has_portal_before(world_light, rays)) {
+        // To the bit the rays by which bounces look around (bake_bounce).
         whole_.draw_part(seed, rays.part, rays.u);
         spread(0, n, hash(seed, point), rays);
         sample_cosine(0, n, rays);

@@ -40,7 +40,7 @@ class Shader {
     float alpha() const { return standard_ ? standard_->alpha() : alpha_; }
     Rgb emission() const { return standard_ ? standard_->emission() : Rgb(0.0f); }
 
-    // Whether it scatters any light: an index-matched boundary without overlays does not.
+    // Whether it scatters any light: without overlays, a boundary that is index-matched or whose specular is 0 does not.
     bool scatters() const;
     // The share of light from all around that goes towards wo, all lobes together.
     Rgb albedo(const V3f& wo) const;
