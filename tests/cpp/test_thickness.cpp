@@ -76,24 +76,25 @@ TEST_CASE("thickness: points that share their chords gain as much as points by t
             }
         }
         for (int c = 0; c < 3; ++c) {
-            CHECK(gain[1][c] == doctest::Approx(gain[0][c]).epsilon(0.02));
-            CHECK(exponent[1][c] == doctest::Approx(exponent[0][c]).epsilon(0.05));
+            CHECK(std::abs(gain[1][c] / gain[0][c] - 1.0f) < 0.015f);
+            CHECK(std::abs(exponent[1][c] / exponent[0][c] - 1.0f) < 0.015f);
         }
     }
 }
 
 TEST_CASE("thickness: a thin slab absorbs sigma_a times its mean chord, twice its thickness") {
-    // Absorption at one hundredth, a tenth and all of the chord's worth.
-    const float thickness = 0.1f;
-    const Medium medium{Rgb(5.0f), Rgb(0.02f, 0.005f, 0.0f), 1.0f};
-    const Rgb gain = mean_gain(slab(thickness), medium);
-    for (int c = 0; c < 3; ++c) {
+    // What it absorbs over that. Exact where next to nothing is absorbed, as light is then even inside too; the model comes
+    // near to it in slabs that scatter little.
+    const Medium medium{Rgb(5.0f), Rgb(0.2f, 0.02f, 0.0f), 1.0f};
+    const auto ratio = [&](float thickness, int c) {
         const double alpha = 5.0 / (5.0 + medium.sigma_a[c]), plane = half_space_albedo(alpha, 1.0).all();
-        const double absorbed = 1.0 - gain[c] * plane;
-        // 16 chords of a heavy-tailed length: the mean of 64 points is within some percent.
-        CHECK(absorbed == doctest::Approx(medium.sigma_a[c] * 2.0 * thickness).epsilon(0.2));
-    }
-    CHECK(gain.z == doctest::Approx(1.0f).epsilon(1e-4));
+        return (1.0 - mean_gain(slab(thickness), medium)[c] * plane) / (medium.sigma_a[c] * 2.0 * thickness);
+    };
+    for (const int c : {0, 1}) CHECK(std::abs(ratio(0.003f, c) - 1.0) < 0.02);
+    // Half a free path thick.
+    CHECK(ratio(0.1f, 1) > 1.0);
+    CHECK(ratio(0.1f, 1) < 1.3);
+    CHECK(mean_gain(slab(0.1f), medium).z == 1.0f);
 }
 
 TEST_CASE("thickness: chords of a closed body end at its own other side, whatever stands in it") {
@@ -115,7 +116,7 @@ TEST_CASE("thickness: what is thick against its absorption, or has no other side
     const Medium medium{Rgb(50.0f), Rgb(1.0f, 5.0f, 25.0f), 1.31f};
     for (const Mesh& mesh : {slab(30.0f), slab(0.01f, false)}) {
         const Rgb gain = mean_gain(mesh, medium);
-        for (int c = 0; c < 3; ++c) CHECK(gain[c] == doctest::Approx(1.0f).epsilon(0.005));  // rays sample directions
+        for (int c = 0; c < 3; ++c) CHECK(std::abs(gain[c] - 1.0f) < 0.003f);  // rays sample directions
     }
 }
 
@@ -160,8 +161,8 @@ TEST_CASE(
         const double sigma = 50.0 + medium.sigma_a[c];
         const HalfSpaceAlbedo plane = half_space_albedo(50.0 / sigma, 1.0);
         const double seen = (1.0 - straight(sigma) - once(50.0)) / (1.0 - white);
-        CHECK(core[c] * plane.multiple * seen + straight(sigma) + once(sigma) ==
-              doctest::Approx(all[c] * plane.all()).epsilon(0.02));
+        const double sum = core[c] * plane.multiple * seen + straight(sigma) + once(sigma);
+        CHECK(std::abs(sum / (all[c] * plane.all()) - 1.0) < 0.035);
     }
 }
 
@@ -172,14 +173,14 @@ TEST_CASE("thickness: what is seen straight through is not the core's, which kee
     Rgb all(0.0f), core(0.0f);
     for (const Rgb& gain : gains_of(scene, medium)) all += gain / 64.0f;
     for (const Rgb& gain : gains_of(scene, medium, 0.0f, 1.0f)) core += gain / 64.0f;
-    CHECK(core.x == doctest::Approx(1.0f).epsilon(1e-4));
+    CHECK(std::abs(core.x - 1.0f) < 1e-5f);
     const auto straight = [&](double sigma) {  // 2 E3(sigma thickness): what crosses the slab unscattered
         return integrate_gauss32([&](double mu) { return 2.0 * mu * std::exp(-sigma * thickness / mu); }, 0.0, 1.0);
     };
     for (int c = 1; c < 3; ++c) {
         const double sigma_a = medium.sigma_a[c], plane = half_space_albedo(50.0 / (50.0 + sigma_a), 1.0).all();
         const double left = (all[c] * plane - straight(50.0 + sigma_a)) / (1.0 - straight(50.0 + sigma_a));
-        CHECK(core[c] * plane == doctest::Approx(left).epsilon(0.01));
+        CHECK(std::abs(core[c] * plane / left - 1.0) < 0.002);
     }
 }
 
@@ -196,8 +197,8 @@ TEST_CASE(
         slope += exponent[2 * k + 1] / 64.0f;
     }
     const EvenLight::Exponent there = thin.even_light[0].half_space(depths);
-    CHECK(at_surface.x == doctest::Approx(there.value).epsilon(0.15));
-    CHECK(slope.x == doctest::Approx(-there.slope).epsilon(0.1));
+    CHECK(std::abs(at_surface.x / there.value - 1.0f) < 0.2f);  // it stands for a mean along the chords
+    CHECK(std::abs(slope.x / -there.slope - 1.0f) < 0.02f);
 }
 
 TEST_CASE("thickness: slabs of ice return what random walks do that its boundary reflects inside") {

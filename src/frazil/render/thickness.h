@@ -7,7 +7,8 @@
 //   over the 1 - e^{-sigma_t c} of a picture that it fills, is the core's. So is light of one scattering, where rays trace it:
 //   what leaves on either side from a place on each chord, against that of a half space.
 // Units: metres.
-// Valid: bench/truth.py measures it; 1 where nothing is absorbed.
+// Valid: bench/truth.py measures it; 1 where nothing is absorbed. Where little is, index-matched slabs of 0.015, 0.5 and 5
+//   free paths absorb 1.01, 1.3 and 1.6 times what is exact (the first two: tests/cpp/test_thickness.cpp).
 // Not: which way the light goes through the part.
 #pragma once
 
