@@ -158,16 +158,38 @@ TEST_CASE("environment: the estimate of irradiance is exact up to degree 2, for 
     }
 }
 
-TEST_CASE("environment: black and negative images still sample; broken ones are refused") {
+TEST_CASE("environment: a black image samples uniformly, a negative one as its positive does") {
     const Environment black(8, 4, std::vector<Rgb>(32, Rgb(0.0f)), "/env");
-    float pdf = 0.0f;
-    black.sample(V2f(0.3f, 0.9f), pdf);
-    CHECK(pdf == doctest::Approx(1.0 / (4 * kPiD)).epsilon(1e-3));
-    const Environment negative(8, 4, std::vector<Rgb>(32, Rgb(-1.0f)), "/env");
-    CHECK(negative.brightness() == doctest::Approx(1.0));
-    negative.sample(V2f(0.0f, 0.99999994f), pdf);
-    CHECK(pdf > 0.0f);
+    const auto result = test::chi_square(
+        [&](const V2f& u, V3f& d) {
+            float pdf;
+            d = black.sample(u, pdf);
+            return std::abs(pdf * 4.0 * kPiD - 1.0) < 1e-5;
+        },
+        [](const V3f&) { return 0.25 / kPiD; }, V3f(0, 1, 0));
+    CHECK(result.hit_rate == 1.0);
+    CHECK(result.p_value > 1e-4);
 
+    const Environment positive = gradient(8, 4);
+    std::vector<Rgb> pixels = positive.pixels();
+    for (Rgb& pixel : pixels) pixel = -pixel;
+    const Environment negative(8, 4, pixels, "/env");
+    CHECK(negative.brightness() == positive.brightness());
+    // The last numbers below 1 too.
+    std::vector<V2f> u = {V2f(0.0f), V2f(0.0f, 0.99999994f), V2f(0.99999994f, 0.0f), V2f(0.99999994f)};
+    for (std::uint32_t i = 0; i < 1000; ++i) u.push_back(Sampler(7, 8, i).next_2d());
+    for (const V2f& at : u) {
+        float pdf, positive_pdf;
+        Rgb radiance, positive_radiance;
+        const V3f direction = negative.sample(at, pdf, radiance);
+        CHECK(direction == positive.sample(at, positive_pdf, positive_radiance));
+        CHECK(pdf == positive_pdf);
+        CHECK(pdf > 0.0f);
+        CHECK(radiance == -positive_radiance);
+    }
+}
+
+TEST_CASE("environment: broken images are refused") {
     std::vector<Rgb> broken(32, Rgb(1.0f));
     broken[9].y = NAN;
     CHECK_THROWS_WITH_AS(Environment(8, 4, broken, "/sky"), doctest::Contains("/sky: pixels must be finite"),
