@@ -272,7 +272,8 @@ def figure_5(studio: Studio, out: Path) -> dict:
 def _seconds(mesh: fz.Mesh, make: Callable[[], fz.PointSet], profile: fz.Dipole, places: fz.PointSet) -> dict:
     """Processor seconds of each stage: points, light of a sky and a sun, tree and gather at `places`."""
     rays = fz.RayScene([mesh])
-    lights = [fz.Light(fz.DomeLight()), fz.Light(fz.DistantLight(2.0), radiance=(3.0, 3.0, 3.0))]
+    sun = fz.Light(fz.DistantLight(2.0), radiance=(3.0, 3.0, 3.0), normalize=True)  # irradiance 3, the sky's is pi
+    lights = [fz.Light(fz.DomeLight()), sun]
     clock = [time.process_time()]
     points = make()
     clock.append(time.process_time())
