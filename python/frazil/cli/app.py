@@ -24,7 +24,8 @@ def _frazil(
 ) -> None:
     """Render glacier ice and other translucent matter from USD to layered OpenEXR.
 
-    Exit status: 0 done, 1 failed, 2 misused, 130 stopped by Ctrl-C. Errors and warnings are single lines on stderr.
+    Exit status: 0 done, 1 failed, 2 misused, 130 stopped by Ctrl-C, 143 by SIGTERM.
+    Errors and warnings are single lines on stderr.
     """
 
 
