@@ -197,6 +197,27 @@ def test_twins_in_a_crowd_cancel_within_noise():
     assert abs((with_crowd["translucency"] - without["translucency"]).mean()) < 0.02 * scale
 
 
+def ball_in(ice: trimesh.Trimesh | None) -> float:
+    """Radiance of a white ball under an even sky of radiance 1, in the middle of clear ice or of air."""
+    scene = fz.Scene()
+    white = fz.StandardMaterial(diffuse_color=(1.0,) * 3, use_specular_workflow=True)
+    clear = fz.IceMaterial(fz.Medium(sigma_s_prime=1e-6, sigma_a=0.0), roughness=0.01)
+    bodies = [("/white", trimesh.creation.icosphere(4, 0.3), white)] + ([("/ice", ice, clear)] if ice else [])
+    for path, body, look in bodies:
+        mesh = fz.Mesh(np.asarray(body.vertices, np.float32), np.asarray(body.faces, np.int32))
+        scene.add_object(path, scene.add_mesh(mesh, path), scene.add_material(path, look))
+    scene.add_light(dome(1.0))
+    scene.camera = fz.Camera(matrix=placed(0, 0, 8), focal_length=500)
+    return float(fz.render(scene, resolution=(16, 9), samples=64)["beauty"][:, :, 1].mean())
+
+
+def test_what_a_white_ball_in_clear_ice_keeps():
+    """A limit of light that goes in as through a flat face: all of it should be left, as clear ice takes nothing."""
+    assert ball_in(None) == pytest.approx(1.0, rel=0.005)
+    assert ball_in(trimesh.creation.icosphere(5, 1.0)) == pytest.approx(0.66, abs=0.02)
+    assert ball_in(trimesh.creation.box((2, 2, 2))) == pytest.approx(0.75, abs=0.02)
+
+
 # ---- occlusion ------------------------------------------------------------------------------------------------------
 
 
