@@ -20,9 +20,9 @@ namespace frazil {
 
 // Where light is absorbed that would leave towards a viewer.
 struct AbsorbingPlaces {
-    std::vector<V3f> positions;
-    std::vector<V3f> normals;  // outwards, where they are seen
-    std::vector<Rgb> depths;   // free paths below the surface there: EvenLight::absorbed_at
+    std::vector<V3f> positions;  // in the space of the body's points, the mean of `depths` below its surface
+    std::vector<V3f> normals;    // outwards, where they are seen
+    std::vector<Rgb> depths;     // free paths below the surface there: EvenLight::absorbed_at
 };
 
 class ThinField {
