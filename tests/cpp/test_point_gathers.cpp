@@ -75,8 +75,8 @@ TEST_CASE("point gathers: a blend comes within some thousandths of a gather at t
         CHECK(off_by(tree + 2, 3) < 0.012);
     }
     // Slopes are noisier.
-    CHECK(off_by(columns.thin(), 1) < 0.006);
-    CHECK(off_by(columns.thin() + 1, 1) < 0.06);
+    CHECK(off_by(columns.thin(), 1) < 0.008);
+    CHECK(off_by(columns.thin() + 1, 1) < 0.1);
 }
 
 TEST_CASE("point gathers: no rows off the surface or on its other side") {

@@ -160,8 +160,52 @@ TEST_CASE("thin field: points that stand for others near them lose none on anoth
     for (const float from_edge : {0.05f, 0.1f}) {
         CAPTURE(from_edge);
         CHECK(std::abs(exponent_at(merged, from_edge, 1.0f, &traced) - exponent_at(plain, from_edge, 1.0f, &traced)) <
-              0.02f);
+              0.03f);
     }
+}
+
+// What places below a floor of sparse points know where Z is `exponent` of the points' own places, per point.
+template <class Exponent>
+std::vector<float> told_below_floor(const Exponent& exponent, float known_at_origin = 1.0f) {
+    const PointSet points = poisson_points(test::floor_square(1.0f, 0.0f), 0.1, {.seed = 3});
+    Thinness known{std::vector<Rgb>(points.size(), Rgb(1.0f)), {}, std::vector<float>(points.size(), 1.0f)};
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        const V3f& p = points.positions[k];
+        const bool is_odd = p.length() < 0.1f && known_at_origin < 1.0f;
+        known.exponent.insert(known.exponent.end(), {Rgb(is_odd ? 5.0f : exponent(p)), Rgb(0.0f)});
+        if (is_odd) known.known[k] = known_at_origin;
+    }
+    const Medium medium{Rgb(9.43f), Rgb(0.57f), 1.0f};
+    const ThinField field(points, nullptr, known, nullptr,
+                          std::make_shared<const ThinMedium>(ThinMedium::of(medium, 0.0f)));
+    AbsorbingPlaces places;
+    for (int i = 0; i < 400; ++i) {  // not near the border, beyond which nothing is known
+        const V2f at(0.05f * static_cast<float>(i % 20) - 0.475f, 0.05f * static_cast<float>(i / 20) - 0.475f);
+        places.positions.push_back({at.x, -0.1f, at.y});
+    }
+    places.normals.assign(400, V3f(0.0f, 1.0f, 0.0f));
+    places.depths.assign(400, Rgb(1.0f));
+    const std::vector<Rgb> told = field.at(places, places.positions, {});
+    std::vector<float> off;
+    for (std::size_t i = 0; i < 400; ++i) off.push_back(told[2 * i].x - exponent(places.positions[i]));
+    return off;
+}
+
+float rms(const std::vector<float>& values) {
+    double sum = 0.0;
+    for (const float value : values) sum += double(value) * double(value);
+    return static_cast<float>(std::sqrt(sum / double(values.size())));
+}
+
+TEST_CASE("thin field: where what points know grows evenly along a surface it is told as it is") {
+    CHECK(rms(told_below_floor([](const V3f& p) { return 0.5f + 2.0f * p.x - p.z; })) < 0.001f);
+}
+
+TEST_CASE("thin field: cells that are half outside of the body are hardly asked") {
+    const auto even = [](const V3f&) { return 0.5f; };
+    const float odd = rms(told_below_floor(even, 0.99f));
+    CHECK(odd > 0.1f);
+    CHECK(rms(told_below_floor(even, 0.5f)) < 0.02f * odd);
 }
 
 TEST_CASE("thin field: where nothing is absorbed there is no exponent") {

@@ -164,7 +164,7 @@ def test_a_render_takes_a_tenth_of_the_points(compensation):
     assert 500 < inside.sum() < 2000
     assert truth[inside].max() > 3 * truth[inside].min()
     # Thickness is no part of the bake's rays: a tenth of the points asks a tenth of them, but each for all of its cell.
-    as_good = 1.05 if compensation == "depth" else 1.0
+    as_good = 1.15 if compensation == "depth" else 1.0
     assert rms(sparse[inside], truth[inside]) <= as_good * rms(plain[inside], truth[inside])
     assert rms(sparse[inside], truth[inside]) < 0.2  # percent
 

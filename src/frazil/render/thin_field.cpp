@@ -14,7 +14,11 @@ namespace {
 constexpr float kCoarser = 4.0f;
 // How far the mean reaches, at least; kOfDecay of the length over which light is absorbed, 1/sigma_tr [Jensen2001], as that is
 // how far thickness is felt.
-constexpr float kSpacings = 2.0f, kOfDecay = 0.7f;
+constexpr float kSpacings = 3.0f, kOfDecay = 0.7f;
+// By exp(-kFade r²), r in reaches, points near to the place count for more.
+constexpr float kFade = 2.0f;
+// Of the reach squared: what the places of points are spread by, at least, before a slope is told from them.
+constexpr float kLeastSpread = 0.004f;
 // Points nearer to each other than this part of the reach tell no more of it together than some of them.
 constexpr float kFewestApart = 0.2f;
 constexpr float kFacesAlike = 0.9f;  // cosine
@@ -28,10 +32,16 @@ float decay_length(const Medium& medium) {
     return most > 0.0f ? 1.0f / std::sqrt(most) : 0.0f;
 }
 
-// Where their cells are, with as much area as is known of.
+// Of a cell that is partly outside the rest tells of another part of the body than the cell: little of its area counts.
+float trusted(float known) {
+    const float square = known * known, fourth = square * square;
+    return fourth * fourth;
+}
+
+// Where their cells are, with as much area as is trusted.
 PointSet known_points(PointSet points, const Cells* cells, const Thinness& known) {
     if (cells) points.positions = cells->centroids;
-    for (std::size_t k = 0; k < points.size(); ++k) points.areas[k] *= known.known[k];
+    for (std::size_t k = 0; k < points.size(); ++k) points.areas[k] *= trusted(known.known[k]);
     return points;
 }
 
@@ -96,25 +106,65 @@ ThinField::ThinField(const PointSet& points, const Cells* cells, const Thinness&
     }
 }
 
-// False where no point is near.
-bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb* exponents) const {
+// What makes the mean of where points tell of the place itself, so that the mean is exact for what grows evenly
+// (local linear regression): weights are multiplied by 1 - lean · (beside - centre), where that is above zero.
+struct ThinField::Lean {
+    V3f centre = V3f(0.0f), lean = V3f(0.0f);
+
+    explicit Lean(const std::vector<Near>& points, float least_spread) {
+        double sum = 0.0;
+        V3d at(0.0);
+        for (const Near& point : points) {
+            sum += point.weight;
+            at += V3d(point.beside) * double(point.weight);
+        }
+        at /= sum;
+        Imath::M33d spread;
+        spread *= double(least_spread);
+        for (const Near& point : points) {
+            const V3d away = V3d(point.beside) - at;
+            for (int row = 0; row < 3; ++row) {
+                for (int column = 0; column < 3; ++column) {
+                    spread[row][column] += away[row] * away[column] * double(point.weight) / sum;
+                }
+            }
+        }
+        centre = V3f(at);
+        lean = V3f(at * spread.inverse());
+    }
+
+    float weight(const Near& point) const {
+        return point.weight * std::max(0.0f, 1.0f - lean.dot(point.beside - centre));
+    }
+};
+
+// False where no point is near. `near_points` is used meanwhile.
+bool ThinField::near(const V3f& place, const V3f& normal, const Rgb& depth, std::vector<Near>& near_points,
+                     Rgb* exponents) const {
     const float sigma_t = mean_sigma_t(medium_->medium), mean = mean_component(depth), own = mean / sigma_t;
     const V3f above = place + normal * own;
     const float scale = 1.0f / (reach_ * reach_);
-    float sum = 0.0f, below = 0.0f;  // below the planes of the points, metres
-    Rgb at_surface(0.0f), slope(0.0f);
-    Rgb grown(0.0f);  // from the points' planes down to the place: slope times metres
+    near_points.clear();
     lookup_->visit(above, [&](std::uint32_t, std::uint32_t point, const V3f& p, const V3f& n) {
         const V3f way = p - place;
         const float q = 1.0f - (p - above).length2() * scale, under = way.dot(n);
         if (!(q > 0.0f && under > 0.0f)) return;
-        const float weight = areas_[point] * q * q * std::exp(-2.0f * scale * (way.length2() - own * own));
-        sum += weight;
-        below += under * weight;
-        at_surface += exponents_[2 * point] * weight;
-        slope += exponents_[2 * point + 1] * weight;
-        grown += exponents_[2 * point + 1] * (under * weight);
+        const float weight = areas_[point] * q * q * std::exp(-kFade * scale * (way.length2() - own * own));
+        if (weight > 0.0f) near_points.push_back({point, weight, under, way - n * under});
     });
+    if (near_points.empty()) return false;
+    const Lean lean(near_points, kLeastSpread * reach_ * reach_);
+    float sum = 0.0f, below = 0.0f;  // below the planes of the points, metres
+    Rgb at_surface(0.0f), slope(0.0f);
+    Rgb grown(0.0f);  // from the points' planes down to the place: slope times metres
+    for (const Near& point : near_points) {
+        const float weight = lean.weight(point);
+        sum += weight;
+        below += point.under * weight;
+        at_surface += exponents_[2 * point.index] * weight;
+        slope += exponents_[2 * point.index + 1] * weight;
+        grown += exponents_[2 * point.index + 1] * (point.under * weight);
+    }
     if (!(sum > 0.0f)) return false;
     const float nearer = mean > 0.0f ? below / (own * sum) : 1.0f;  // than the plane where it is seen
     for (int c = 0; c < 3; ++c) {
@@ -134,9 +184,10 @@ std::vector<Rgb> ThinField::at(const AbsorbingPlaces& places, const std::vector<
     std::vector<Rgb> result(2 * below.size(), Rgb(0.0f));
     std::vector<std::size_t> missed;
     std::vector<V3f> missed_places;
+    std::vector<Near> near_points;
     for (std::size_t i = 0; i < below.size(); ++i) {
         if (places.normals[i] != V3f(0.0f) &&
-            near(places.positions[i], places.normals[i], places.depths[i], &result[2 * i])) {
+            near(places.positions[i], places.normals[i], places.depths[i], near_points, &result[2 * i])) {
             continue;
         }
         missed.push_back(i);

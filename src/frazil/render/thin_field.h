@@ -8,6 +8,7 @@
 // Not: exponents at the points (thickness.h).
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -38,7 +39,16 @@ class ThinField {
     std::vector<Rgb> inside(const std::vector<V3f>& places, const GatherOptions& options) const;
 
   private:
-    bool near(const V3f& place, const V3f& normal, const Rgb& depth, Rgb* exponents) const;
+    // A point that tells of a place.
+    struct Near {
+        std::uint32_t index;  // in the order of the lookup
+        float weight;
+        float under;  // its plane the place is, metres
+        V3f beside;   // from the place to where the point tells of: as deep under its plane, below the point
+    };
+    struct Lean;
+    bool near(const V3f& place, const V3f& normal, const Rgb& depth, std::vector<Near>& near_points,
+              Rgb* exponents) const;
 
     std::shared_ptr<const PointTree> tree_;
     std::shared_ptr<const ThinMedium> medium_;
