@@ -58,6 +58,20 @@ def test_denoised_layers_still_sum_to_the_beauty():
         assert after < 0.7 * before, name
 
 
+def test_denoising_gives_silhouettes_no_colour_of_its_own():
+    pytest.importorskip("pyoidn", reason="Open Image Denoise is an extra")
+    truth, film = (fz.render(ice_over_floor(), samples=n, seed=5, **OPTIONS) for n in (512, 4))
+    alpha = truth["beauty"][:, :, 3]
+    silhouette = (alpha > 0.02) & (alpha < 0.98)
+    denoise_film(film)
+    assert silhouette.sum() > 200
+    for name in ("diffuse", "specular"):
+        error = (film[name] - truth[name])[silhouette]
+        colour = np.sqrt(np.mean((error - error.mean(axis=1, keepdims=True)) ** 2)) / truth[name][silhouette].mean()
+        print(name, colour)
+        assert colour < 0.027, name
+
+
 def test_negative_light_stays_negative():
     pytest.importorskip("pyoidn", reason="Open Image Denoise is an extra")
     film = fz.render(ice_over_floor(key=-10.0), samples=8, **OPTIONS)
