@@ -68,7 +68,6 @@ def test_denoising_gives_silhouettes_no_colour_of_its_own():
     for name in ("diffuse", "specular"):
         error = (film[name] - truth[name])[silhouette]
         colour = np.sqrt(np.mean((error - error.mean(axis=1, keepdims=True)) ** 2)) / truth[name][silhouette].mean()
-        print(name, colour)
         assert colour < 0.027, name
 
 
